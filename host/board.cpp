@@ -65,7 +65,7 @@ bool Board::post_to_loop(std::function<void(AsyncBoard&)> action) {
       [impl = impl_.get(), action = std::move(action)] { action(impl->async); });
 }
 
-// Each call owns the Impl, so that the Board may be destroyed while the call waits.
+// Each waiting call owns the Impl, so that the Board may be destroyed meanwhile.
 
 void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);

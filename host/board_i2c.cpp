@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The devices on the user's I2C bus, and the set-up of a described device.
 #include <algorithm>
 #include <string>
 
@@ -13,7 +12,7 @@ namespace r4 {
 
 namespace {
 
-// A period that a command cannot hold stays out of range.
+// Clamped to a range that is wider than the valid range, so that an invalid period stays invalid.
 int milliseconds(Board::Duration period) {
   return static_cast<int>(std::clamp<std::int64_t>(period.count(), 0, 1'000'000));
 }

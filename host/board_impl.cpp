@@ -73,7 +73,7 @@ void Board::Impl::start() {
   }
 }
 
-// Ends the loop first: it does not wait for callbacks, so a callback may close the board.
+// Ends the loop before the callbacks: the loop does not wait, so a callback may close the board.
 void Board::Impl::close() {
   BlockingLoop::close([this] { shut(); });
   keep(nullptr);  // after shut(), so that the farewell is recorded
@@ -120,14 +120,14 @@ void Board::Impl::listen() {
     {
       const std::lock_guard lock(mutex);
       link = fresh;
-      state = async.state();  // heartbeats change its `safe`
+      state = async.state();  // heartbeats change `safe`
       in_control = async.in_control();
     }
     news.notify_all();
     callbacks.notify(fresh);
   });
   async.on_event([this](const CarrierEvent& event) {
-    take_name();  // a board that was plugged in again may have another port
+    take_name();  // a reconnected board may have another port
     callbacks.notify(event);
   });
   async.on_path([this](const PathStatus& path) { callbacks.notify(path); });
@@ -157,7 +157,8 @@ void Board::Impl::take_name() {
   for (const PathStatus& path : paths) path_names.push_back(path.name);
 }
 
-// Heartbeats mean that the robot is attended. Looks again when a callback may reach the limit.
+// Holds the heartbeats back if a callback hangs, because the program then leaves the robot
+// unattended. The timer expires when a callback may reach the limit.
 void Board::Impl::look_at_callbacks() {
   const auto busy = callbacks.busy_for();
   const bool hangs = busy && *busy >= callback_limit;
@@ -176,7 +177,7 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   const auto ms = std::chrono::duration_cast<Duration>(busy).count();
   asio::post(io, [this, ms] {
     const auto next = callbacks.busy_for();
-    if (next && *next >= callback_limit) return;  // also hangs; its end releases the heartbeats
+    if (next && *next >= callback_limit) return;  // also hangs: its end releases the heartbeats
     if (!std::exchange(held_for_callback, false)) return;
     async.hold_heartbeats(false);
     callbacks.notify(CarrierEvent{
@@ -281,7 +282,7 @@ PostResult Board::Impl::post(const Setpoints& setpoints) {
   if (is_held_back()) return PostResult::not_armed;
   return box.put(setpoints) ? PostResult::sent : PostResult::queue_full;
 }
-// True if this program refuses output commands now; counts the refusal. Under the lock.
+// True if output commands are refused here; counts the refusal. Under the lock.
 bool Board::Impl::is_held_back() {
   if (arming != Arming::required || disarmed_by == DisarmCause::none) return false;
   ++refused_here;

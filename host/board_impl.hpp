@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of a Board: the link's thread, the callbacks' thread, and calls that wait.
+// The implementation of a Board: the link's thread, the callbacks' thread, and waiting calls.
 //     a thread of the program       the link's thread            the callbacks' thread
 //     send() -- Call, post() -->    AsyncBoard on its loop  -->  callback_thread.hpp
 //            <-- ended, news --
 //
-// The link's thread (blocking_loop.hpp) does not wait. The only code of the program that it runs is
-// the program's own transport and functions given to post_to_loop().
+// The link's thread (blocking_loop.hpp) does not wait. Of the program's code, it runs only the
+// program's own transport and functions of post_to_loop().
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ namespace r4 {
 struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   using CarriersMaker = std::function<std::vector<std::unique_ptr<Carrier>>(Loop& loop)>;
   Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first);
-  // Returns with running threads. Throws Error, also if the system has no thread or descriptor.
+  // Starts the threads. Throws Error, also if the system has no thread or descriptor.
   static std::shared_ptr<Impl> started(const CarriersMaker& make, BoardOptions options,
                                        BoardCallbacks first);
   void start();
@@ -46,11 +46,11 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   void require_control(std::string_view what);
   void require_sendable(const Command& command);
   void require_sendable(const Setpoints& setpoints);
-  // Has the board execute a command, a group, or the named request. Throws unless it is confirmed.
+  // Executes a command, a group or the named request. Throws Error unless the board confirms it.
   std::shared_ptr<const Part> execute(const Command& command, Duration timeout);
   void execute(const Setpoints& setpoints, Duration timeout);
   void execute(const std::string& request, Start start, Duration timeout);
-  // The same, but the caller judges the outcome. Throws if it is unknown or the board is closed.
+  // The same, but returns any outcome. Throws Error if it is unknown or the board is closed.
   std::shared_ptr<const Part> run(const std::string& text, Start start, Duration timeout,
                                   bool stop = false);
   PostResult post(const Command& command);
@@ -69,14 +69,14 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
       return !queue;
     });
   }
-  // Returns the result of `ask` on the loop, or `last` if the board is closed.
+  // Returns the result of `ask` on the loop; `last` if the board is closed.
   template <class Report, class Ask>
   Report report(std::string_view what, const Report& last, Ask ask) {
     Report now;
     return run_on_loop(what, [&] { now = ask(); }) ? now : read(last);
   }
 
-  // Both throw Error{usage} if `channel` is not 1 to 16.
+  // Both throw Error{usage} if `channel` is not 1-16.
   void calibrate_servo(int channel, const ServoCalibration& calibration);
   ServoCalibration servo_calibration(int channel);
 
@@ -86,7 +86,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
 
   void listen();
   void take_name();
-  // Control may have been released since the post.
+  // The program may have released control after the post.
   template <class What>
   PostResult post_now(const What& what) {
     try {
@@ -117,17 +117,16 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   bool held_for_callback = false;
 
   // Shared by all threads, under the lock. A change of the state or the link notifies `news`.
-  std::string name;  // of the transports
+  std::string name;  // the transports' names
   std::vector<std::string> path_names;
   ReceivedState state;
   std::uint64_t states = 0;
   std::vector<std::weak_ptr<States::Queue>> queues;
-  // Received bytes, for read() and for callbacks.
   struct UartInbox {
     UartStream stream;
     UartData to_read;
     UartData to_report;
-    bool reports = false;  // a callback has been added
+    bool reports = false;  // has callbacks
   };
   UartInbox uarts[uart_channels];
   LinkStatus link;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The loop of a Board's thread, as transports see it.
+// The loop of a Board's thread, for transports.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -9,7 +9,7 @@ namespace r4 {
 CallbackThread::CallbackThread(std::function<void(Clock::duration)> on_end)
     : on_end_(std::move(on_end)), ring_(capacity) {}
 
-// The last callback may destroy the board, and then this thread cannot join itself.
+// If a callback destroys the board, this thread cannot join itself.
 CallbackThread::~CallbackThread() {
   if (thread_.joinable()) thread_.detach();
 }
@@ -64,7 +64,7 @@ void CallbackThread::run() {
   Notice notice;
   std::function<void()> task;
   while (take(notice, task)) {
-    // noexcept: an exception of a callback ends the program where it is thrown.
+    // noexcept: an exception from a callback ends the program where it is thrown.
     [&]() noexcept {
       if (task) {
         task();

@@ -2,11 +2,10 @@
 // The thread on which the callbacks of a Board run, beside the thread of its link.
 //     the link's loop --notify()--> notices, 64 at most --> the callbacks, one at a time
 //
-// A callback may take long and may wait for the board: heartbeats and commands continue. But a
-// callback that hangs leaves the robot unattended, so it must end in the safe state: after a limit
-// of busy_for() the loop stops the heartbeats.
+// A callback may wait for the board: heartbeats and commands continue. But a hanging callback
+// leaves the robot unattended, so the loop stops the heartbeats when busy_for() exceeds a limit.
 //
-// The link does not wait for callbacks. A newer state replaces a waiting one. While 32 notices
+// The link does not wait for callbacks. A newer state replaces a waiting state. While 32 notices
 // wait, refusals and warnings are dropped; while 64 wait, the oldest. notify() allocates nothing.
 #pragma once
 
@@ -46,24 +45,24 @@ class CallbackThread {
                               DisarmCause, RefusedPost, UartNews>;
   static constexpr std::size_t capacity = 64;
 
-  // `on_end` is called on this thread after each callback, with the time that the callback ran.
+  // `on_end` is called on this thread after each callback, with the callback's run time.
   explicit CallbackThread(std::function<void(Clock::duration)> on_end);
   ~CallbackThread();
   CallbackThread(const CallbackThread&) = delete;
   CallbackThread& operator=(const CallbackThread&) = delete;
 
-  // `take` takes the waiting bytes. Call this before start().
+  // Call it before start(). `take` removes and returns the waiting bytes.
   void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
   // Keeps `owner` until the thread ends.
   void start(std::shared_ptr<void> owner);
-  // After this returns, no callback runs except the caller, and none is called again.
+  // After the return no callback runs, except a callback that called stop().
   void stop();
 
   void notify(Notice notice);
-  // No value if no callback runs.
+  // Empty if no callback runs.
   std::optional<Clock::duration> busy_for() const;
 
-  // Adds a callback, which is called with the newest notice, if any, and with each new notice.
+  // Adds a callback. It is called with the newest notice, if any, and with each new notice.
   template <class Kind>
   Subscription add(std::function<void(const Kind&)> callback) {
     return add(std::get<Subscribers<Kind>>(callbacks_), std::move(callback));
@@ -77,7 +76,7 @@ class CallbackThread {
   }
 
  private:
-  // An action that runs after notice number `after`.
+  // `action` runs after notice number `after`.
   struct Task {
     std::uint64_t after;
     std::function<void()> action;
@@ -90,19 +89,19 @@ class CallbackThread {
     {
       const std::lock_guard lock(mutex_);
       if (ended_) return {};
-      // Queued among the notices, so that no notice is reported twice or left out.
+      // Queued among the notices, so that the callback gets each notice exactly once.
       tasks_.push_back({told_, [this, &callbacks, one] {
                           callbacks.add(one);
                           call_first(*one);
                         }});
-      news_.notify_one();  // with the lock: the callback may run at once and destroy this
+      news_.notify_one();  // under the lock: the callback may run at once and destroy this
     }
     return Subscription(one);
   }
   void run();
   bool take(Notice& notice, std::function<void()>& task);
   void call(const Notice& notice);
-  // Stops if a callback has closed the board.
+  // Ends early if a callback closes the board.
   template <class Kind>
   void call_each(const Subscribers<Kind>& callbacks, const Kind& news) {
     callbacks.each([&](auto& one) {
@@ -128,7 +127,7 @@ class CallbackThread {
   std::atomic<std::thread::id> id_{};
   std::mutex joining_;
 
-  // Used on this thread only: the callbacks, and the newest notices.
+  // Used only on this thread: the callbacks and the newest notices.
   std::tuple<Subscribers<Restart>, Subscribers<ReceivedState>, Subscribers<LinkStatus>,
              Subscribers<CarrierEvent>, Subscribers<PathStatus>, Subscribers<DisarmCause>,
              Subscribers<RefusedPost>>
@@ -144,8 +143,8 @@ class CallbackThread {
   std::condition_variable news_;
   std::atomic<bool> ended_{false};
   std::vector<Notice> ring_;
-  std::uint64_t told_ = 0;   // notices so far; the newest is ring_[(told_ - 1) % capacity]
-  std::uint64_t taken_ = 0;  // notices taken out or dropped
+  std::uint64_t told_ = 0;   // notices so far; the newest is at (told_ - 1) % capacity
+  std::uint64_t taken_ = 0;  // notices that were taken or dropped
   std::deque<Task> tasks_;
   std::optional<Clock::time_point> busy_since_;
 };

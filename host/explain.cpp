@@ -80,7 +80,7 @@ CauseWords words_of(LinkCause cause) {
 constexpr const char* clear_on_purpose =
     "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), ";
 
-// Why outputs are not driven, and what to do before arm().
+// Why outputs are off, and the action before arm().
 Words disarm_words(DisarmCause cause) {
   switch (cause) {
     case DisarmCause::not_yet:
@@ -117,7 +117,7 @@ Words disarm_words(DisarmCause cause) {
   return {};
 }
 
-// Named only if there is no other cause: an unused path does not disturb the other paths.
+// Reported only without another cause, because an unused path does not disturb the other paths.
 constexpr LinkCauses harmless{LinkCause::other_board};
 
 Words link_words(const LinkStatus& link) {
@@ -151,7 +151,7 @@ bool link_is_well(const LinkStatus& link) {
   return link.state == HostLinkState::active && link.causes.without(harmless).empty();
 }
 
-// Below, `command` is null for a request that is not a command.
+// In the functions below, `command` is null for a request that is not a command.
 
 bool is(CommandKind kind, const Command* command) {
   return command != nullptr && command->kind == kind;
@@ -254,7 +254,7 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
         Problem why = failed_transfer({}, result.transfer.outcome);
         return {std::move(why.reason), std::move(why.fix)};
       }
-      // Without a code the board has not refused: the link cannot begin.
+      // Without a code, the board did not refuse it: the link cannot begin.
       if (result.code == Refusal::none) return link_words(link);
       words = refusal_words(command, result.code, link);
       break;
@@ -367,8 +367,7 @@ Problem explain(const std::vector<PathStatus>& paths) {
   std::string names;
   std::string boards;
   for (const PathStatus& path : paths) {
-    const bool unnamed =
-        path.board_id.empty();  // on a bus, a watcher does not ask the board for its id
+    const bool unnamed = path.board_id.empty();  // on a bus, a watcher does not send Q:ID
     if (unnamed && path.state != PathState::other_board) continue;
     names += (names.empty() ? "" : ", ") + path.name;
     boards += (boards.empty() ? "" : ", ") + path.name + " to " +

@@ -11,7 +11,7 @@ struct Words {
   std::string reason;
   std::string fix;
 };
-// Why a board is safe, and how that ends.
+// Why a board is safe, and how the safe state ends.
 Words safe_words(const LinkStatus& link);
 bool is_of_wiring(const LinkStatus& link);
 

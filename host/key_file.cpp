@@ -50,7 +50,7 @@ Key load_key(const std::string& path) {
   if (S_ISDIR(status.st_mode)) {
     throw Error(ErrorKind::open, path, "is a directory", "name the file that holds the key");
   }
-  // Root may let a group read its file, as systemd does with credentials of a service.
+  // A group may read a file of root, as with systemd's credentials of a service.
   const mode_t allowed = status.st_uid == 0 ? S_IRWXU | S_IRGRP : S_IRWXU;
   if ((status.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO) & ~allowed) != 0) {
     throw Error(ErrorKind::permission, path, "others can read or write this key",

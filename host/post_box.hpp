@@ -55,7 +55,7 @@ class PostBox {
     {
       const std::lock_guard lock(mutex_);
       woken_ = false;
-      wake_memory_.release();  // Asio has freed it before this call
+      wake_memory_.release();  // Asio freed this memory before the call
       taken_.swap(waiting_);
     }
     for (const Letter& letter : taken_) deliver_(letter);
@@ -68,7 +68,7 @@ class PostBox {
   std::vector<Letter> waiting_;
   std::vector<Letter> taken_;
   bool woken_ = false;
-  // Room for one wake-up: at most one is under way.
+  // Memory of the only wake-up under way.
   alignas(std::max_align_t) std::byte wake_buffer_[128];
   std::pmr::monotonic_buffer_resource wake_memory_{wake_buffer_, sizeof wake_buffer_};
 };

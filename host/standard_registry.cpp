@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The only file of the host that knows the simulated board, and recordings as boards.
+// The only file of the host that uses the simulated board and replays.
 #include "standard_registry.hpp"
 
 #include <algorithm>
@@ -43,7 +43,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-// Equal for URLs that name the same path, as far as their texts show.
+// Equal for URLs whose texts name the same path.
 std::string path_of(const std::string& text) {
   Url url = Url::parse(text);
   url.take("share");

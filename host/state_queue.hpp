@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of States: a bounded queue to a thread of the program; the link does not wait.
+// The implementation of States: a bounded queue. The link does not wait for the program.
 #pragma once
 
 #include <fmt/format.h>
@@ -34,7 +34,7 @@ class States::Queue {
     {
       const std::lock_guard lock(mutex_);
       if (ended_) return;
-      // No state is put after a gap until the gap has been reported.
+      // After a gap, no state is queued until the gap has been reported.
       if (lossless_ && (gap_ != 0 || count_ == most_)) {
         ++gap_;
         ++missed_;
@@ -90,7 +90,7 @@ class States::Queue {
     first_ = (first_ + 1) % ring_.size();
     --count_;
   }
-  // Grows on demand, so a short queue stays small. At its full size it allocates nothing.
+  // A short queue stays small. At its full size it allocates nothing.
   void grow() {
     std::rotate(ring_.begin(), ring_.begin() + static_cast<std::ptrdiff_t>(first_), ring_.end());
     first_ = 0;

@@ -19,17 +19,17 @@ class Subscriber {
  public:
   virtual ~Subscriber() = default;
   void end() {
-    // After a fork, no thread runs the callback. A lock that a thread held then is never released.
+    // After a fork, no thread runs the callback, and a lock of another thread is never released.
     if (::getpid() != process_) return;
     ended_ = true;
     std::shared_ptr<void> gone;            // destroyed without the lock
-    const std::lock_guard lock(running_);  // waits for a call in another thread
+    const std::lock_guard lock(running_);  // waits for a running call
     gone = take();
   }
   bool ended() const { return ended_; }
 
  protected:
-  // Takes out the callback with its captures. Under the lock.
+  // Removes the callback with its captures. Under the lock.
   virtual std::shared_ptr<void> take() = 0;
 
   std::recursive_mutex running_;
@@ -49,7 +49,7 @@ class Subscribers {
    public:
     explicit One(Function function) : function_(std::make_shared<Function>(std::move(function))) {}
     void operator()(const Arguments&... arguments) {
-      // Keeps the captures until the call is over, and is destroyed without the lock.
+      // Keeps the captures during the call. Destroyed after the lock is released.
       std::shared_ptr<Function> called;
       const std::lock_guard lock(running_);
       if (ended()) return;
@@ -62,7 +62,7 @@ class Subscribers {
     std::shared_ptr<Function> function_;
   };
 
-  // An empty function adds no callback and returns an ended handle.
+  // An empty function adds no callback, and the returned handle is ended.
   Subscription add(Function function) {
     if (!function) return {};
     const auto one = std::make_shared<One>(std::move(function));
@@ -77,7 +77,7 @@ class Subscribers {
     list_ = std::make_shared<const List>(std::move(fresh));
   }
 
-  // Callbacks that are added during the call are left out.
+  // Skips callbacks that are added during the call.
   template <class Action>
   void each(Action action) const {
     std::unique_lock lock(mutex_);

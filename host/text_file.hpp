@@ -6,7 +6,7 @@
 
 namespace r4 {
 
-// The first `most` + 1 bytes, to reject a longer file. Throws Error{open}, {permission} with `fix`.
+// At most `most` + 1 bytes, to detect a longer file. Throws Error{open}, {permission} with `fix`.
 std::string read_text_file(const std::string& path, std::size_t most, const char* fix);
 
 }  // namespace r4

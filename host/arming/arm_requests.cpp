@@ -47,7 +47,7 @@ Time ArmRequests::next_deadline() const {
   return next;
 }
 
-// A newer cause than the one at the call of arm() is unknown to the program, so it ends the call.
+// A cause that is newer than the call of arm() ends the call: the program must decide again.
 void ArmRequests::on_cause(std::int32_t newest, Time now) {
   for (Request& each : requests_) {
     if (each.cause == Command::unnamed_cause) each.cause = newest;
@@ -78,7 +78,7 @@ std::optional<Command> ArmRequests::next_step(SafeReason reason, Time now) {
   return {};
 }
 
-// After E:CLEAR the board's next reason decides. A cancelled step ends with its requests.
+// After E:CLEAR, the board's next reason decides. A cancelled step ends with its requests.
 void ArmRequests::on_step(CommandKind kind, const CommandResult& result, SafeReason reason,
                           bool supply_open, Time now) {
   if (requests_.empty()) return;
@@ -94,7 +94,7 @@ void ArmRequests::disarm(DisarmCause cause) {
   report();
 }
 
-// A reason that the board reported before it obeyed this session may be older than the session.
+// A reason from before the control of this session may be older than the session.
 void ArmRequests::on_link(bool up, bool in_control, bool safe, SafeReason reason) {
   if (!up) machine_.on_outage();
   if (in_control) machine_.on_heard(reason);

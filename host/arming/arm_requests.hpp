@@ -5,10 +5,10 @@
 //                  +---- the board has executed the step (E:CLEAR or R:1,On) ---------+
 //
 //     It ends confirmed when the program is armed; refused when the board refuses a step; not_armed
-//     when arming is impossible, or a cause has come that is newer than the call; timed_out,
-//     cancelled and closed like a command.
+//     when arming is impossible, or a cause is newer than the call; timed_out, cancelled and closed
+//     like a command.
 //
-// Several calls share their steps, and end together. Later output commands wait for them to end.
+// Several calls share the steps, and end together. Later output commands wait for the end.
 #pragma once
 
 #include <cstddef>
@@ -38,12 +38,12 @@ class ArmRequests {
   bool may_drive() const { return mode_ == Arming::off || machine_.armed(); }
   DisarmCause cause() const { return machine_.cause(); }
 
-  // `cause`: of the newest known cause, or unnamed_cause. False if max_requests wait already.
+  // `cause`: number of the newest known cause, or unnamed_cause. False if max_requests calls wait.
   bool add(Ticket ticket, std::int32_t cause, Time deadline, Time now);
   bool any() const { return !requests_.empty(); }
-  // The ticket of the oldest call; greater than any ticket if there is none.
+  // The ticket of the oldest call; without a call, greater than any ticket.
   Ticket first() const { return requests_.empty() ? no_ticket : requests_.front().ticket; }
-  // End all calls, the call with that ticket (false: none), or those past their deadline.
+  // End all calls, the call with `ticket` (false: no such call), or the calls past their deadlines.
   void end(Outcome outcome, Refusal code, Time now);
   bool cancel(Ticket ticket, Time now);
   void expire(Time now);
@@ -51,7 +51,7 @@ class ArmRequests {
   // The number of the newest cause that only E:CLEAR ends; 0 if there is none.
   void on_cause(std::int32_t newest, Time now);
 
-  // True, once, if all requests ended during a step. The caller then drops the step.
+  // True, once, if all requests ended during a step: the caller then drops the step.
   bool take_abandoned() { return std::exchange(abandoned_, false); }
   // Call it while the board obeys and no step is under way. `reason`: why the outputs are off.
   std::optional<Command> next_step(SafeReason reason, Time now);

@@ -39,7 +39,7 @@ const char* to_text(DisarmCause cause) {
 
 namespace {
 
-// The cause for a reason of the board; none for `none` and `link`.
+// None for `none` and `link`.
 DisarmCause cause_of(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:
@@ -59,7 +59,7 @@ DisarmCause cause_of(SafeReason reason) {
   return DisarmCause::none;
 }
 
-// The same for a stop, a watchdog or a fault that may be older than the session.
+// For a reason that may be older than the session.
 DisarmCause earlier_cause_of(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:
@@ -73,8 +73,8 @@ DisarmCause earlier_cause_of(SafeReason reason) {
 
 }  // namespace
 
-// The first cause is kept until the next arm(): later causes only follow from it. A fault with
-// which a board begins, such as a wiring that nobody has confirmed, waits for a person.
+// The first cause is kept until the next arm(), because later causes follow from it. A fault since
+// the board's start, such as an unconfirmed wiring, waits for a person.
 void ArmingMachine::disarm(DisarmCause cause) {
   if (cause == DisarmCause::restart) {
     earlier_ = static_cast<std::uint8_t>(earlier_ | bit(SafeReason::fault));
@@ -87,7 +87,7 @@ void ArmingMachine::on_reason(SafeReason reason) {
   if (cause != DisarmCause::none && armed()) cause_ = cause;
 }
 
-// The board reports its gravest reason. One that only E:CLEAR ends may hide less grave reasons.
+// The board reports its gravest reason. A reason that only E:CLEAR ends may hide other reasons.
 void ArmingMachine::on_heard(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:

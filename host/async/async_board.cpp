@@ -53,7 +53,7 @@ AsyncBoard::AsyncBoard(const executor_type& executor,
 
 AsyncBoard::~AsyncBoard() {
   impl_->close();
-  // Inside a callback the transport is still running: it is destroyed after the callback.
+  // In a callback, the transport runs: it is destroyed after the callback.
   if (impl_->depth > 0) asio::post(impl_->io, [keep = impl_] {});
 }
 
@@ -64,7 +64,7 @@ AsyncBoard::executor_type AsyncBoard::get_executor() const noexcept {
   return impl_->io.get_executor();
 }
 
-// In a handler of its own: a slot must not lose its handler while the handler runs.
+// Posted, because a slot must not lose its handler while the handler runs.
 void AsyncBoard::Cancel::operator()(asio::cancellation_type) const {
   const std::shared_ptr<Impl> impl = impl_.lock();
   if (impl) asio::post(impl->io, [impl, command = command_] { impl->cancel(command); });
@@ -106,7 +106,7 @@ void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
   });
 }
 
-// Sends one setting after the other. The user's handler gets the result of the last setting.
+// Sends one setting after the other. The user's handler receives the last result.
 class AsyncBoard::TimingSteps final : public Impl::Sequence {
  public:
   TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
@@ -134,7 +134,7 @@ class AsyncBoard::TimingSteps final : public Impl::Sequence {
   const Time deadline_;
 };
 
-// Sends a transfer, then waits for the answer that names it.
+// Sends a transfer, then waits for the answer with the packet number of the transfer.
 class AsyncBoard::TransferSteps final : public Impl::Sequence {
  public:
   TransferSteps(Impl& impl, Time timeout, CompletionPtr completion)
@@ -170,7 +170,7 @@ class AsyncBoard::TransferSteps final : public Impl::Sequence {
   const Time timeout_;
   const Time deadline_;
   bool begun_ = false;      // the board has confirmed the command
-  std::uint32_t pnum_ = 0;  // of that command
+  std::uint32_t pnum_ = 0;  // of the command
 };
 
 void AsyncBoard::start_transfer(const Command& command, Duration timeout,
@@ -183,7 +183,7 @@ void AsyncBoard::start_transfer(const Command& command, Duration timeout,
   (new TransferSteps(*impl_, Impl::time_of(timeout), std::move(completion)))->begin(command);
 }
 
-// Closes the board, or watches it, after the farewell, and hands the result on.
+// After the farewell, closes the board or watches it, and passes the result on.
 class AsyncBoard::Farewell final : public Impl::Sequence {
  public:
   using Then = void (*)(Impl& impl);
@@ -207,7 +207,7 @@ void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
 
 BoardRole AsyncBoard::role() const { return impl_->role; }
 
-// The role must not change while control is being released: the board is not known to be safe yet.
+// The role must not change while control is being released, because the board may not be safe.
 void AsyncBoard::require_role_settled(std::string_view what) const {
   if (!impl_->is_open() || !impl_->session.leaving()) return;
   throw Error(ErrorKind::usage, std::string(what), "control is being released",
@@ -312,7 +312,7 @@ void AsyncBoard::Impl::describe(const Device& device) {
   describe_in_recording(device);
 }
 
-// The recording begins with what is known already.
+// The recording begins with the known names and events.
 void AsyncBoard::record(Recording& recording) {
   Impl& impl = *impl_;
   for (const auto& path : impl.paths) {
@@ -332,7 +332,6 @@ void AsyncBoard::Impl::name_in_recording() {
   for (const auto& path : paths) path->tap.on_name(board);
 }
 
-// A recording that ends by itself does not end the link.
 void AsyncBoard::Impl::warn_of_recordings() {
   std::optional<Problem> problem;
   for (const auto& path : paths) {

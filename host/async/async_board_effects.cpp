@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An AsyncBoard does the effects of its session: it sends, then it reports.
+// An AsyncBoard performs the effects of its session: it sends, then reports.
 #include <utility>
 #include <variant>
 
@@ -28,7 +28,7 @@ void AsyncBoard::Impl::send_all() {
   }
 }
 
-// On a bus, a watcher sends nothing but stops and leases.
+// On a bus, a watcher sends only stops and leases.
 bool AsyncBoard::Impl::only_listens(std::size_t path) const {
   return session.board_role() == BoardRole::watch && carrier(path).is_shared();
 }

@@ -12,16 +12,16 @@ namespace r4 {
 
 namespace {
 
-// The session counts by the steady clock. `clock_start` is the calendar's time at its zero.
+// The session uses the steady clock. `clock_start` is the system time at its zero.
 SessionOptions with_clock(SessionOptions options, Time now) {
   const auto epoch = std::chrono::system_clock::now().time_since_epoch();
   options.clock_start = std::chrono::duration_cast<Time>(epoch) - now;
   return options;
 }
 
-// After this time outside the event loop, only the newest of the waiting states is reported.
+// After this time outside the event loop, only the newest waiting state is reported.
 constexpr Time held_up{std::chrono::milliseconds{50}};
-// From this delay on there is a warning, because two heartbeats were late.
+// From this delay on a warning is reported, because two heartbeats were late.
 constexpr Time very_late{std::chrono::milliseconds{200}};
 constexpr std::chrono::seconds open_interval{1};
 
@@ -38,7 +38,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
       timer(context),
       reopening(context) {}
 
-// Returns the delay of what was due; 0 inside another entry.
+// Returns the delay of due actions; 0 inside another entry.
 Time AsyncBoard::Impl::begin_entry(Completion::How way) {
   if (depth == 0) how = way;
   session.on_trouble(paths.trouble());
@@ -55,7 +55,7 @@ void AsyncBoard::Impl::end_entry(Time late) {
   settle();
 }
 
-// Datagrams that have waited in sockets and buffers since before the sleep are dropped.
+// Datagrams from before the sleep are dropped: they may wait in sockets and buffers.
 void AsyncBoard::Impl::on_sleep() {
   backlog.on_sleep();
   session.on_sleep(now);
@@ -76,7 +76,7 @@ void AsyncBoard::Impl::settle() {
   const Inside inside(depth);
   for (;;) {
     notify_all();
-    // Handlers that are dispatched may start commands; their ends are appended.
+    // A dispatched handler may start commands. Their ends are appended.
     while (std::optional<Waits::Ended> ended = waits.take_ended()) {
       guarded([&] { ended->completion.release()->complete(ended->result, how); });
     }
@@ -100,7 +100,7 @@ bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
                  ? is_heard(link.state)
                  : link.state == HostLinkState::active && link.in_control;
     case Waits::For::answer:
-      // In an answer, 0 means that there is none yet.
+      // 0: the state has no answer.
       return condition.pnum != 0 && session.state().i2c_answer.pnum == condition.pnum;
     case Waits::For::time:
       return now >= condition.deadline;
@@ -125,8 +125,8 @@ void AsyncBoard::Impl::cancel(Ticket id) {
     const Ticket ticket = waits.cancel(id, now);
     if (ticket == 0) return;
     session.cancel(ticket, now);
-    notify_all();                             // its end, with what is known of the command
-    waits.end(ticket, {Outcome::cancelled});  // a stop continues: only the wait ends
+    notify_all();                             // reports the end with the known facts
+    waits.end(ticket, {Outcome::cancelled});  // a stop continues; only the wait ends
     poll_wanted = true;
   });
 }
@@ -139,7 +139,7 @@ void AsyncBoard::Impl::open() {
   std::optional<Problem> problem;
   for (const auto& path : paths) {
     open_path(*path, problem);
-    if (phase != Phase::made) return;  // the callback for `up` has closed the board
+    if (phase != Phase::made) return;  // a callback for `up` has closed the board
   }
   const auto is_opened = [](const auto& path) { return path->opened; };
   if (std::none_of(paths.begin(), paths.end(), is_opened)) throw Error(*problem);
@@ -154,7 +154,7 @@ void AsyncBoard::Impl::open() {
   if (problem) open_again();
 }
 
-// If one path is open, failed paths are tried again later. `problem`: the first error.
+// `problem`: the first error.
 void AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& problem) {
   path.opened = false;
   try {
@@ -193,7 +193,7 @@ Ticket AsyncBoard::Impl::leave(Time timeout) {
 
 void AsyncBoard::Impl::close() {
   if (phase == Phase::closed) return;
-  // The farewell is sent once; close() does not wait for an answer.
+  // Sent once, without waiting for an answer.
   if (is_open()) enter(Completion::How::post, [this] { leave(Time{0}); });
   phase = Phase::closed;
   paths.close();
@@ -208,7 +208,7 @@ void AsyncBoard::Impl::cancel_waits() {
                        now);
 }
 
-// Control is taken on all paths or none; watching cannot be refused. Transports may reopen.
+// Takes control on all paths or none. Watching is never refused. Transports may reopen.
 void AsyncBoard::Impl::become(BoardRole fresh) {
   std::size_t changed = 0;
   try {
@@ -233,7 +233,7 @@ void AsyncBoard::Impl::become(BoardRole fresh) {
   });
 }
 
-// The timer is set only if it must ring earlier; ringing early costs one poll.
+// Sets the timer only for an earlier time. An early expiry costs one poll.
 void AsyncBoard::Impl::arm() {
   const Time next = waits.next(due);
   if (armed && armed_for <= next) return;
@@ -264,7 +264,7 @@ void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
     paths[0].tap.on_packets(session.packets());
     poll_wanted = true;
     send_all();
-    notify_all();  // events may have views of these bytes
+    notify_all();  // events may contain views of these bytes
   });
 }
 

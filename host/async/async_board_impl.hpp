@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The implementation of an AsyncBoard: a session, its paths, its timer, and the waits. Every call
-// of the session is made inside enter(), which then sends. The outermost enter() also reports, and
-// sets the timer. on_datagram() reports at once.
+// of the session is inside enter(), which then sends. The outermost enter() also reports and sets
+// the timer. on_datagram() reports at once.
 #pragma once
 
 #include <algorithm>
@@ -28,8 +28,8 @@
 
 namespace r4 {
 
-// Outlives an AsyncBoard that a callback destroys. It has more than 15 members and 40 functions,
-// because every function of AsyncBoard ends here.
+// Outlives an AsyncBoard that a callback destroys. Larger than 15 members and 40 functions, because
+// it implements every function of AsyncBoard.
 struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<AsyncBoard::Impl> {
   using Waits = r4::Waits<CompletionPtr>;
   class Sequence;
@@ -47,27 +47,27 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
     Subscribers<RefusedPost> refused;
   };
 
-  // From `leaving` on, nothing is reported to the user and the user starts nothing.
+  // From `leaving` on, the user receives no reports and cannot start commands.
   //     made --open()--> open --async_close()--> leaving --confirmed, or time is up--> closed
   //                        +-------------------- close() -------------------------------^
   enum class Phase : std::uint8_t { made, open, leaving, closed };
   bool is_open() const { return phase == Phase::open; }
   bool has_link() const { return phase == Phase::open || phase == Phase::leaving; }
 
-  // Throws Error{usage} for no transport, and for more than a session has paths.
+  // Throws Error{usage} for no transport, and for more than Session::most_paths.
   Impl(asio::io_context& context, std::vector<std::unique_ptr<Carrier>> transports,
        BoardOptions options);
 
   static Time steady_now() {
     return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
   }
-  // At most a day: that is as good as for ever, and cannot overflow.
+  // At most a day, so that sums cannot overflow.
   static Time time_of(Duration timeout) {
     return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
   }
 
-  // Runs the user's code. An exception leaves io.run() in a handler of its own: if it passed
-  // through the transport, whose handler may have called us, it would end reception for ever.
+  // Runs the user's code. An exception leaves io.run() from a separate handler: in a handler of the
+  // transport it would end reception for ever.
   template <class Code>
   void guarded(Code code) {
     try {
@@ -83,7 +83,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
       if (is_open()) guarded([&] { one(arguments...); });
     });
   }
-  // Also while the board is being opened.
+  // Also during open().
   void report(const CarrierEvent& event) {
     callbacks.event.each([&](auto& one) {
       if (is_open() || phase == Phase::made) guarded([&] { one(event); });
@@ -121,8 +121,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void settle();
   bool end_waits();
 
-  // `start` returns the command's ticket; after 0 the command ends as `not_taken`. `id`: the ticket
-  // of the first step, if this is a later step.
+  // `start` returns the command's ticket; if 0, the command ends as `not_taken`. `id`: the ticket
+  // of the first step; 0 for the first step.
   template <class Start>
   void begin(CompletionPtr completion, Start start, Ticket id = 0,
              Outcome not_taken = Outcome::full) {
@@ -131,7 +131,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
       try {
         if (is_open()) ticket = start();
       } catch (const Error&) {
-        if (id == 0) throw;  // a later step: control may have been released since
+        if (id == 0) throw;  // in a later step, control may be released
         not_taken = Outcome::cancelled;
       }
       if (ticket != 0) {
@@ -160,7 +160,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
     on_carrier_event(path, {CarrierEvent::Kind::down, *path.trouble});
   }
   void open_again();
-  // Sends a farewell. Returns its ticket, or 0 if no board hears it.
+  // Sends a farewell. Returns its ticket; 0 if no board receives it.
   Ticket leave(Time timeout);
   void close();
   void become(BoardRole fresh);
@@ -169,7 +169,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void name_in_recording();
   void describe(const Device& device);
   void describe_in_recording(const Device& device);
-  // X:OFF gives up the device that has that slot.
+  // X:OFF gives up the device with this slot.
   void give_up_slot(const Command& command);
   void give_up_slot(const Setpoints&) {}
   void warn_of_recordings();
@@ -194,11 +194,11 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
 
   asio::io_context& io;
   BoardPaths paths;
-  std::vector<Device> devices;  // that recordings describe
+  std::vector<Device> devices;  // described in recordings
   std::vector<const Device*> attaching;
-  std::uint32_t boots = 0;           // times that the board has restarted
-  const std::uint32_t heartbeat_ms;  // interval of our heartbeats
-  const Time board_timeout;          // how long a board waits for its host
+  std::uint32_t boots = 0;           // number of restarts of the board
+  const std::uint32_t heartbeat_ms;  // interval of this host's heartbeats
+  const Time board_timeout;          // the board's timeout
   Session session;
   BoardIdentity identity;
 
@@ -211,19 +211,19 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   bool poll_wanted = false;
   Completion::How how = Completion::How::post;
   Phase phase = Phase::made;
-  std::atomic<BoardRole> role;  // of the session, for any thread
+  std::atomic<BoardRole> role;  // the session's role, for any thread
 
   Time now{0};
   Time due{0};
   asio::steady_timer timer;
   asio::steady_timer reopening;
-  LinkStatus reported;  // by which paths were reported last
+  LinkStatus reported;  // of the last report of paths
   bool armed = false;
   Time armed_for{0};
-  std::atomic<Time::rep> fed{0};  // when feed() was called last; 0: the session knows it
+  std::atomic<Time::rep> fed{0};  // the last feed(); 0: passed to the session
 };
 
-// The completion of several steps, which stands before the user's.
+// The completion of a command with several steps, before the user's completion.
 class AsyncBoard::Impl::Sequence : public Completion {
  public:
   Sequence(const Sequence&) = delete;
@@ -238,7 +238,7 @@ class AsyncBoard::Impl::Sequence : public Completion {
   Sequence(Impl& impl, CompletionPtr completion)
       : impl_(impl), completion_(std::move(completion)) {}
   virtual ~Sequence() = default;
-  // Destroys this, then hands the result to the user's handler.
+  // Destroys this, then passes the result to the user's handler.
   void end(CommandResult result, How called) {
     result.elapsed = steady_now() - started_;
     const CompletionPtr::pointer handler = completion_.release();
@@ -247,7 +247,7 @@ class AsyncBoard::Impl::Sequence : public Completion {
   }
 
   Impl& impl_;     // owns this
-  Ticket id_ = 0;  // of the first step, by which all are cancelled
+  Ticket id_ = 0;  // of the first step; cancels all steps
 
  private:
   const Time started_ = steady_now();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The datagrams that came while a program stood still: of the states in a backlog only the newest
-// is reported. Datagrams from before a sleep of this computer are dropped.
-//     live --the program stands still--> in backlog --the transport is drained--> live
-//     any  --sleep----> waking     --drained, or the timer rang twice--> live
+// Datagrams that came while the loop was delayed. Only the newest state of a backlog is reported.
+// Datagrams from before a sleep of this computer are dropped.
+//     live --the loop was delayed------> in backlog --the transport is drained--> live
+//     any  --sleep----> waking     --drained, or the timer expired twice--> live
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ class Backlog {
     waking_ = 2;
     forget();
   }
-  // The kept state is of an earlier boot of the board, or from before a sleep.
+  // Drops the kept state, which is from an earlier boot of the board or from before a sleep.
   void forget() { size_ = 0; }
 
   bool drops() const { return waking_ != 0; }
@@ -36,8 +36,8 @@ class Backlog {
     waking_ = 0;
     rings_ = 0;
   }
-  // The timer rang. True if the kept state is to be reported: twice without on_drained(), so the
-  // transport may be one that never says that it is drained.
+  // The timer expired. True if the kept state must be reported: after two expiries without
+  // on_drained(), because some transports never call on_drained().
   bool on_timer() {
     if (waking_ != 0) --waking_;
     rings_ = size_ == 0 ? 0 : rings_ + 1;
@@ -48,8 +48,8 @@ class Backlog {
 
  private:
   bool behind_ = false;
-  int waking_ = 0;  // times that the timer may ring until nothing from before a sleep can come
-  int rings_ = 0;   // times that the timer has rung while a state was kept
+  int waking_ = 0;  // timer expiries until no datagram from before a sleep can come
+  int rings_ = 0;   // timer expiries while a state is kept
   std::array<char, max_datagram> state_;
   std::size_t size_ = 0;
 };

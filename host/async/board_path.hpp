@@ -44,7 +44,7 @@ class BoardPath final : public Carrier::Handler {
   const std::unique_ptr<Carrier> carrier;
   RecordingTap tap;
   bool opened = false;
-  std::optional<Problem> trouble;  // why it could not be opened, as reported last
+  std::optional<Problem> trouble;  // the last reported reason why it could not be opened
 
  private:
   Owner& owner_;
@@ -68,7 +68,7 @@ class BoardPaths {
   void close() {
     for (const auto& path : paths_) path->carrier->close();
   }
-  // The names of the transports. Programs ask for them with each state, so nothing is allocated.
+  // The names of the transports. Programs call it with each state, so it allocates nothing.
   const std::string& name() {
     name_.clear();
     for (const auto& path : paths_) {
@@ -82,7 +82,7 @@ class BoardPaths {
     for (const auto& path : paths_) counters_ += path->carrier->counters();
     return counters_;
   }
-  // The trouble of the last path; none if at least one path has no trouble.
+  // The last path's trouble; none if at least one path has no trouble.
   TransportTrouble trouble() const {
     TransportTrouble common = TransportTrouble::none;
     for (const auto& path : paths_) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Waits of handlers for the end of a command or a condition. Ended waits are kept until taken out.
+// Handlers that wait for the end of a command or for a condition. Ended waits are kept until taken.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@ template <class CompletionPtr>
 class Waits {
  public:
   enum class For : std::uint8_t {
-    active,  // the board is active, or is heard by a watcher
-    answer,  // the state has the end of the I2C transfer `pnum`
+    active,  // the link is active or, for a watcher, safe
+    answer,  // the state has the answer to the I2C transfer `pnum`
     time,    // the deadline
   };
   struct Condition {
@@ -35,7 +35,7 @@ class Waits {
     CompletionPtr completion;
   };
 
-  // A command under way. `id`: cancels it; the ticket of its first step.
+  // Adds a command. `id`: the ticket of the first step, which cancels the command.
   void add(Ticket ticket, Ticket id, CompletionPtr completion) {
     commands_.push_back({ticket, id, std::move(completion)});
   }
@@ -43,7 +43,7 @@ class Waits {
   // An id that is not a ticket of a session.
   Ticket next_id() { return next_id_++; }
 
-  // The command has ended. Ignored if no handler waits for it.
+  // Ignored if no handler waits for the command.
   void end(Ticket ticket, const CommandResult& result) {
     const auto found = std::find_if(commands_.begin(), commands_.end(),
                                     [&](const Command& each) { return each.ticket == ticket; });
@@ -52,7 +52,7 @@ class Waits {
     if (found != commands_.end() - 1) *found = std::move(commands_.back());
     commands_.pop_back();
   }
-  // Ends each condition for which `outcome_of` returns an outcome. True if there were any.
+  // Ends each condition for which `outcome_of` returns an outcome. True if a condition ended.
   template <class OutcomeOf>
   bool end_conditions(OutcomeOf outcome_of, Time now) {
     const std::size_t before = conditions_.size();
@@ -63,7 +63,7 @@ class Waits {
     });
     return conditions_.size() != before;
   }
-  // Ends the condition with that id as cancelled. Returns the ticket of the command with that id,
+  // Ends the condition with this id as cancelled. Returns the ticket of the command with this id,
   // which the session must cancel; 0 if there is none.
   Ticket cancel(Ticket id, Time now) {
     end_conditions(

@@ -12,8 +12,8 @@ namespace r4 {
 
 namespace {
 
-// The session ends every command at the deadline of the call. If a call that has begun has not
-// ended by this time after its deadline, the loop hangs.
+// The session ends every command at the deadline of the call. If a begun call lasts this much
+// longer than its deadline, the loop hangs.
 constexpr BlockingLoop::Duration grace{500};
 
 constexpr BlockingLoop::Duration patience{1000};
@@ -35,7 +35,7 @@ Error BlockingLoop::closed_error(std::string_view what) const {
                        "open it again with another " + type, Outcome::closed});
 }
 
-// `instead`: the effect on the call, such as "not sent".
+// `instead`: the effect on the call, "not sent".
 Error BlockingLoop::blocked_error(std::string_view what, std::string_view instead,
                                   std::string_view fix) const {
   return Error(Problem{
@@ -96,7 +96,7 @@ bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()
   const auto turn = std::make_shared<Turn>();
   std::unique_lock lock(mutex);
   if (closed) return false;
-  // The reference to `action` stays valid, because the caller waits while it runs.
+  // `action` stays valid, because the caller waits while it runs.
   asio::post(io, [this, turn, &action] {
     std::unique_lock loop_lock(mutex);
     if (turn->abandoned) return;
@@ -163,7 +163,7 @@ void BlockingLoop::close(std::function<void()> shut) {
 
 void BlockingLoop::end_loop() {
   work_.reset();
-  // Posted twice: begin() may still post the end of a command on a closed board.
+  // Posted twice, because begin() may post the end of a command on a closed board.
   asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
 }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thread on which the links of a Board or a Fleet run, and the calls that wait for it.
+// The thread of the links of a Board or a Fleet, and the calls that wait for it.
 //     a thread of the program           the loop's thread
 //     run(call) ---- posted ---->       begin(): each board starts its part, with the time left
 //        waits  <--- end() ------       each part ends
 //
-// A caller gives up at its deadline, or when on_wait() throws. A call that has not begun by then
-// never begins. A call that has begun is cancelled. A stop is sent however late it is.
+// A caller gives up at its deadline, or when on_wait() throws. Then a call that has not begun never
+// begins, and a begun call is cancelled. A stop is sent, however late.
 #pragma once
 
 #include <algorithm>
@@ -38,12 +38,12 @@ class BlockingLoop {
   using Clock = std::chrono::steady_clock;
   using Duration = std::chrono::milliseconds;
   static constexpr Duration wait_interval{50};
-  // How long close() waits for the boards to report that they are free.
+  // The longest wait of close() for the boards' reports that they are free.
   static constexpr Duration farewell_limit{100};
 
   struct Call;
   using CallPtr = std::shared_ptr<Call>;
-  // Ends a part of a call, on the loop. Cancelled with the call.
+  // Ends a part of a call, on the loop.
   struct End {
     void operator()(const CommandResult& result) const { loop->end(*call, part, result); }
     BlockingLoop* loop;
@@ -51,14 +51,14 @@ class BlockingLoop {
     std::size_t part;
   };
   using BoundEnd = asio::cancellation_slot_binder<End, asio::cancellation_slot>;
-  // Begins a board's part, on the loop, with the time that is left.
+  // Begins a board's part, on the loop, with the remaining time.
   using Start =
       std::function<void(AsyncBoard& board, std::size_t part, Duration left, BoundEnd end)>;
   struct Part {
     AsyncBoard* board = nullptr;
     CommandResult result{};
     LinkStatus link{};                 // at the end
-    std::optional<Problem> trouble{};  // why it could not begin: the role has changed
+    std::optional<Problem> trouble{};  // why the part could not begin: the role has changed
     asio::cancellation_signal cancelled{};
   };
   // Owned by both threads, because the caller may give up.
@@ -79,7 +79,7 @@ class BlockingLoop {
   };
   static Start start_of(CommandOrGroup what);
 
-  // How errors name it, "board" or "fleet", and their fix if its thread does not answer.
+  // For errors: "board" or "fleet", and the fix if the thread does not answer.
   struct Name {
     std::string_view thing;
     std::string_view fix;
@@ -90,17 +90,17 @@ class BlockingLoop {
   BlockingLoop(const BlockingLoop&) = delete;
   BlockingLoop& operator=(const BlockingLoop&) = delete;
 
-  // Waits until all parts have ended. Throws if late or closed, and what on_wait() throws.
+  // Waits until all parts have ended. Throws Error if late or closed, and exceptions of on_wait().
   void run(const CallPtr& call, Duration timeout);
-  // Begins the call, with Board::default_timeout, and does not wait. No effect if closed.
+  // Begins the call with Board::default_timeout, and does not wait. No effect if closed.
   void run_unawaited(const CallPtr& call);
   // Does not wait. False if the loop is closed.
   bool post_to_loop(std::function<void()> action);
-  // Waits until `action` has ended. False if the loop is closed. Throws if it does not begin in
-  // time: then it never runs. Passes on what it throws.
+  // Waits until `action` has ended. False if the loop is closed. If `action` does not begin in
+  // time, throws Error, and `action` never runs. Passes on exceptions of `action`.
   bool run_on_loop(std::string_view what, const std::function<void()>& action);
-  // False at the deadline; a sleep of this computer counts, though the deadline stands still. If
-  // the loop is closed, throws an error about `what()`. Both run under the lock.
+  // False at the deadline, or after a longer sleep, which stops the deadline's clock. If the loop
+  // is closed, throws an error about `what()`. what() and arrived() run under the lock.
   template <class What, class Predicate>
   bool wait_for_news(What what, Duration timeout, Predicate arrived) {
     const SleepWatch slept;
@@ -110,8 +110,8 @@ class BlockingLoop {
     if (closed) throw closed_error(what());
     return woken && slept.time() <= bounded(timeout);
   }
-  // Waits until `done()`, which is called under the lock, is true; false at the deadline. Calls
-  // while_waiting() every 50 ms without the lock, and passes on what it throws.
+  // Waits until done() is true; false at the deadline. done() runs under the lock. Calls
+  // while_waiting() every 50 ms without the lock, and passes on its exceptions.
   template <class Predicate>
   static bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
                          Clock::time_point deadline, const std::function<void()>& while_waiting,
@@ -126,7 +126,7 @@ class BlockingLoop {
     return true;
   }
 
-  // At most a day: that is as good as for ever, and cannot overflow.
+  // At most a day, so that sums cannot overflow.
   static Duration bounded(Duration timeout) {
     return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
   }
@@ -142,8 +142,8 @@ class BlockingLoop {
   // Runs `shut` on the loop unless it is closed, and joins the thread. Idempotent.
   void close(std::function<void()> shut);
 
-  // The first step of `shut`: nothing is put on the loop afterwards. Returns false if the loop was
-  // already closed; otherwise calls `last` under the lock.
+  // The first step of `shut`: the loop then accepts nothing. Returns false if the loop was already
+  // closed; otherwise calls `last` under the lock.
   template <class Last>
   bool mark_closed(Last last) {
     {
@@ -155,14 +155,14 @@ class BlockingLoop {
     news.notify_all();
     return true;
   }
-  // `shut` ends with this: everything on the loop is run, then the loop ends.
+  // The last step of `shut`: the loop runs everything that was posted, then ends.
   void end_loop();
 
   const std::function<void()> on_wait;
   asio::io_context io;
-  // Both threads use these.
+  // Used by both threads.
   std::mutex mutex;
-  std::condition_variable news;  // `closed`, or what wait_for_news() waits for, has changed
+  std::condition_variable news;  // `closed` or the condition of wait_for_news() has changed
   bool closed = false;
 
  protected:

@@ -35,7 +35,7 @@ std::string form_with_ranges(const CommandHelp& command) {
   return command.form + (command.ranges.empty() ? "" : " with " + command.ranges);
 }
 
-// The forms of the command that `text` begins with, or of all commands with its letter.
+// The forms of the command at the start of `text`, or of all commands with the same letter.
 std::string forms_like(std::string_view text) {
   std::string forms;
   if (text.empty() || (text.size() > 1 && text[1] != ':')) return forms;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The errors for wrong and refused commands, with what to do instead.
+// The errors for wrong and refused commands, with a fix.
 #pragma once
 
 #include <string>
@@ -16,12 +16,12 @@ namespace r4 {
 Problem bad_command(std::string_view text, Refusal refusal);
 Problem bad_command(const Command& command, Refusal refusal);
 
-// Throws Error{usage} for values outside their ranges, or texts too long for a datagram.
+// Throws Error{usage} for values out of range, and for texts that are too long for a datagram.
 void require_valid(const Command& command);
 
-// Why a transfer on the user's bus has failed, although the board has executed the command.
+// Why a transfer on the user's bus failed. The board has executed the command.
 Problem failed_transfer(std::string_view command, I2cOutcome outcome);
-// Throws Error{usage} for a group without commands. Setpoints holds only valid commands.
+// Throws Error{usage} for an empty group. Setpoints holds only valid commands.
 void require_any(const Setpoints& group);
 
 }  // namespace r4

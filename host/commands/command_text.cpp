@@ -21,7 +21,7 @@ std::string_view without_last_semicolon(std::string_view text) {
   return text.substr(0, text.size() - (text.ends_with(';') ? 1 : 0));
 }
 
-// The command's texts are views of `text`.
+// The texts of the result are views of `text`.
 Command parsed(std::string_view text) {
   const std::string_view trimmed = without_last_semicolon(text);
   const auto colon = trimmed.find(':');
@@ -34,13 +34,13 @@ Command parsed(std::string_view text) {
     refusal = parse_fields(command.text, set);
   }
   if (refusal == Refusal::none && command.kind == CommandKind::setting) {
-    Settings settings;  // the board's settings are unknown, so each key has its whole range
+    Settings settings;  // the board's settings are unknown: each key has its whole range
     settings.heartbeat_ms = 50;
     settings.timeout_ms = 10000;
     refusal = set(settings, command.text, command.text2);
   }
   if (refusal != Refusal::none) throw Error(bad_command(trimmed, refusal));
-  // A text may hold bytes that the grammar forbids. Such a command cannot be written.
+  // Empty if a text holds bytes that the grammar forbids.
   if (to_text(command).empty()) throw Error(bad_command(trimmed, Refusal::format));
   return command;
 }
@@ -56,8 +56,7 @@ std::string byte_words(int count, Text at = Text()) {
 // "rate 50"
 std::string setting_words(const Command& command) {
   std::string text = shown(command);
-  text.erase(0,
-             std::min(text.size(), std::string_view("C:").size()));  // none if it cannot be written
+  text.erase(0, std::min(text.size(), std::string_view("C:").size()));  // empty if not writable
   if (const std::size_t comma = text.find(','); comma != std::string::npos) text[comma] = ' ';
   return text;
 }

@@ -18,7 +18,7 @@ constexpr KindWords kind_words[] = {
 #include "r4link/tables/board.def"
 };
 
-// The name of a value in a form, and its range: {0} and {1} are the least and the most.
+// In `range`, {0} and {1} are the least and the most.
 struct ValueWords {
   std::string_view name;
   std::string_view range;
@@ -29,7 +29,7 @@ constexpr ValueWords value_words[] = {
 #include "r4link/tables/board.def"
 };
 
-// A setting's values: {0} and {1} are the least and the most, {2} and {3} a hundredth of them.
+// {0} and {1} are the least and the most, {2} and {3} a hundredth of them.
 constexpr std::string_view taken_values[] = {
 #define R4_SETTING(setting, key, keys, min, max, standard, values) values,
 #include "r4link/tables/board.def"

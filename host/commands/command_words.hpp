@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Words for commands and settings, beside the tables of the portable core (r4link/tables/).
+// Words for commands and settings. The portable core (r4link/tables/) has no words.
 #pragma once
 
 #include <string>
@@ -14,14 +14,14 @@ struct KindWords {
   CommandKind kind;
   std::string_view name;     // "OSMC"
   std::string_view meaning;  // "OSMC motor driver"
-  // The command in words. describe() replaces the names in braces.
+  // describe() replaces the names in braces.
   std::string_view sentence;
-  // Used for a value of 0, and without an optional value. Empty: `sentence` is used.
+  // For a value of 0 or an omitted optional value. Empty: `sentence` is used.
   std::string_view empty_sentence = {};
 };
 const KindWords& words_of(CommandKind kind);
 
-// The setting's values: "50-1000 ms, below the timeout".
+// "50-1000 ms, below the timeout".
 std::string values_of(Setting setting);
 
 }  // namespace r4

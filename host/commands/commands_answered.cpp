@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the board's datagrams end the commands under way.
+// The board's datagrams that end commands under way.
 #include "commands_under_way.hpp"
 #include "r4link/tables/commands.hpp"
 #include "r4link/tables/state_fields.hpp"
@@ -9,8 +9,8 @@ namespace r4 {
 
 namespace {
 
-// For boards without CMD: true if `state`, as one datagram carried it, shows the value that
-// `command` sets. Never true for commands without a state field (threshold, fields, settings).
+// For boards without CMD: true if the datagram of `state` shows the value of `command`. Never true
+// for commands without a state field (threshold, fields, settings).
 bool state_shows(const State& state, const Command& command) {
   if (command.kind == CommandKind::relay) {
     return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;
@@ -40,7 +40,7 @@ void CommandsUnderWay::on_state(Time now) {
         finish(pending, Outcome::confirmed, Refusal::none, now);
       } else if (past && pending.stage == Stage::sent) {
         pending.stage = Stage::overtaken;
-        pending.retry = now;  // the answer to a retry decides: ask at once
+        pending.retry = now;  // at once: the answer to the retry decides
       }
     } else if (!fields.answers() && fields.stage() != FieldSelection::Stage::asking &&
                state_shows(state, pending.command)) {
@@ -57,7 +57,7 @@ void CommandsUnderWay::on_stop(const SafeReport& report, Time now) {
   }
 }
 
-// A board whose host has left is safe for the reason `link` or a graver reason. A heartbeat from
+// After a farewell the board is safe with the reason `link` or a graver reason. A heartbeat from
 // before the farewell proves nothing: then the answer to a repetition ends the farewell.
 void CommandsUnderWay::on_heartbeat(const SafeReport& report, std::optional<std::uint32_t> t_ms,
                                     Time now) {
@@ -69,7 +69,7 @@ void CommandsUnderWay::on_heartbeat(const SafeReport& report, std::optional<std:
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
     if (pending.kind != CommandKind::clear || !name_cause(pending)) continue;
-    // The program did not know the newer cause when it called for this E:CLEAR.
+    // The cause is newer than the program's call.
     if (cause_ != 0 && cause_ != pending.cause) {
       finish(pending, Outcome::cancelled, Refusal::none, now);
     }
@@ -77,10 +77,10 @@ void CommandsUnderWay::on_heartbeat(const SafeReport& report, std::optional<std:
 }
 
 // True if T is from after the farewell. A state of the same millisecond may be older. On a slow
-// network the board's clock has a large error, so only a certainly later T counts.
+// network the board's clock has a large error: then T must be later with certainty.
 bool CommandsUnderWay::is_after_farewell(std::uint32_t t_ms) const {
   constexpr Time fast{5000};
-  constexpr Time tick{1000};  // the board shows one T for this long
+  constexpr Time tick{1000};  // the resolution of T
   if (farewell_.state_ms && !newer(t_ms, *farewell_.state_ms)) return false;
   const BoardClock::Instant shown = board_.clock().at(t_ms);
   if (!shown.error) return true;
@@ -90,7 +90,7 @@ bool CommandsUnderWay::is_after_farewell(std::uint32_t t_ms) const {
 
 void CommandsUnderWay::on_identity(const Identity& identity, Time now) {
   for (Pending& pending : pending_.under_way()) {
-    // A second answer to an earlier question does not answer this question.
+    // An answer to an earlier question does not count.
     if (identity.has_asked && identity.asked != pending.pnum) continue;
     BoardWiring wiring;
     const bool answered =
@@ -105,9 +105,9 @@ void CommandsUnderWay::on_identity(const Identity& identity, Time now) {
 void CommandsUnderWay::on_refusal(const Nack& nack, bool proof, bool others, Time now) {
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.pnum != nack.pnum) continue;
-    if (pending.kind == CommandKind::leave) {  // executed, or the board has no session of this host
+    if (pending.kind == CommandKind::leave) {  // executed, or no session with this host
       const bool left = nack.code == Refusal::duplicate;
-      if (!left && others) continue;  // a duplicate may be executed: a heartbeat will show it
+      if (!left && others) continue;  // a duplicate may be executed: a heartbeat shows that
       finish(pending, left ? Outcome::confirmed : Outcome::refused, nack.code, now);
       continue;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How commands begin, are sent, and end by time or by the program (see commands_answered.cpp).
+// The start, the sending, and the end of commands by time or by the program.
 #include "commands_under_way.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace r4 {
 
 namespace {
 
-// Commands that switch the outputs off are repeated soon, even while the heartbeats are held.
+// Commands that switch outputs off are repeated quickly, even while heartbeats are held back.
 bool is_urgent(CommandKind kind) { return kind == CommandKind::stop || kind == CommandKind::leave; }
 
 constexpr Time no_deadline = std::chrono::hours{24};
@@ -48,12 +48,12 @@ CommandsUnderWay::Pending* CommandsUnderWay::allocate(const Command& command, Ti
   if (command.kind == CommandKind::clear) {
     slot->cause = command.value;
     name_cause(*slot);
-    forget_stop();  // the E:CLEAR clears it
+    forget_stop();  // the E:CLEAR clears the stop
   }
   return slot;
 }
 
-// Gives an E:CLEAR without a named cause the present cause. False before the first heartbeat.
+// Sets the present cause in an E:CLEAR without a cause. False before the first heartbeat.
 bool CommandsUnderWay::name_cause(Pending& pending) const {
   if (pending.cause == Command::unnamed_cause) pending.cause = cause_;
   if (pending.cause == Command::unnamed_cause) return false;
@@ -116,7 +116,7 @@ Ticket CommandsUnderWay::leave(Time timeout, Time now) {
 }
 
 bool CommandsUnderWay::send_step(const Command& command, Time now) {
-  Pending* const pending = allocate(command, no_deadline, now);  // its arm() has a deadline
+  Pending* const pending = allocate(command, no_deadline, now);  // arm() has the deadline
   if (pending == nullptr) return false;
   pending->is_step = true;
   transmit(*pending, now);
@@ -183,7 +183,7 @@ bool CommandsUnderWay::knows_groups(Time now) {
   return board_.groups().state() != GroupSupport::State::unknown;
 }
 
-// Chooses between one datagram and many. False if the choice is unknown: then the group waits.
+// Chooses one datagram or single commands for a group. False if unknown: the group waits.
 bool CommandsUnderWay::choose_form(Pending& pending, Time now) {
   if (pending.step != 0) return true;
   if (!knows_groups(now)) {
@@ -214,7 +214,7 @@ bool CommandsUnderWay::is_group_ahead() {
 }
 
 void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
-  if (pending.stage == Stage::lingering) return pending_.remove(pending);  // its end was reported
+  if (pending.stage == Stage::lingering) return pending_.remove(pending);  // the end was reported
   CommandResult result{outcome, code, now - pending.started,
                        outcome == Outcome::not_armed ? arming_.cause() : DisarmCause::none};
   if (pending.is_step) {
@@ -224,7 +224,7 @@ void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, T
   }
   if (outcome == Outcome::confirmed && pending.has_more()) {
     ++pending.step;
-    pending.stage = Stage::queued;  // it gets a number of its own
+    pending.stage = Stage::queued;  // the next command gets a new number
     return;
   }
   result.pnum = pending.pnum;
@@ -234,7 +234,7 @@ void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, T
   }
   ends_.end(pending.ticket, result);
   if (pending.kind == CommandKind::stop && outcome == Outcome::confirmed) {
-    forget_stop();  // at most one lingers
+    forget_stop();  // at most one stop lingers
     pending.stage = Stage::lingering;
     pending.deadline = now + options_.stop_linger;
   } else {

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of a session from the call to their end: sent when the session has control, and
-// repeated until the board's answer or state proves how they ended. Without I/O.
+// The commands of a session from the call to the end. They are sent when the session has control,
+// and repeated until the board's answer or state proves the end. Without I/O.
 //     queued --control--> sent --CMD == PNum in the board's state--> confirmed
 //                          |  ^                  N:…,<code>  ------> refused
 //                          +--+ the same bytes   deadline    ------> timed out
 //                         every 50 ms
 //
-// A retry has the bytes and the packet number of the original (signed anew, if there is a key), so
-// the board can execute it only once. When CMD has moved past a command, the retry's answer
-// (DUPLICATE: executed, STALE: not) decides. The board forgets over an outage, so a refusal proves
-// that the command was not executed only if it names a session that began before the command was
-// sent. With a key, AUTH proves only that one duplicate was refused, not all. A board without CMD
-// (the paper's release) confirms a command by the value that its state shows.
+// A retry has the bytes and the packet number of the original, and a new signature if there is a
+// key. So the board executes the command only once. When CMD has passed a command, the retry's
+// answer decides: DUPLICATE is executed, STALE is not executed. A refusal proves that the command
+// was not executed only if it names a session that began before the command: the board forgets
+// executed commands over an outage. With a key, AUTH proves only that one duplicate was refused. A
+// board without CMD (the paper's release) confirms a command by the value in its state.
 //
 // If the board executes groups (../link/group_support.hpp), a group is one datagram and one pending
-// command. Otherwise its commands go one after the other, and later commands wait.
+// command. Otherwise its commands are sent one after the other, and later commands wait.
 //
-// E:STOP does not wait for the link. It is repeated every 20 ms until a heartbeat of the board
-// reports the reason `stop` and this stop's own number, and then for a while longer, because an
-// E:CLEAR of another program may be on its way. E:CLEAR names the cause that was known at the call,
-// and is given up when the board reports a newer cause.
+// E:STOP does not wait for the link. It is repeated every 20 ms until a heartbeat reports the
+// reason `stop` and the number of this stop. Then it is repeated for stop_linger, because an
+// E:CLEAR of another program may arrive. E:CLEAR names the cause that was known at the call, and is
+// given up when the board reports a newer cause.
 #pragma once
 
 #include <cstddef>
@@ -48,7 +48,7 @@ class CommandsUnderWay {
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;
 
-  // All references outlive this.
+  // All references must outlive this.
   CommandsUnderWay(const SessionOptions& options, HostLink& link, LinkKeeper& keeper,
                    Outbox& outbox, HeardBoard& board, const ArmRequests& arming, CommandEnds& ends,
                    Statistics& counts);
@@ -60,9 +60,9 @@ class CommandsUnderWay {
   Ticket send(const Setpoints& group, Time timeout, Time now);
   Ticket leave(Time timeout, Time now);
   Ticket take_ticket() { return next_ticket_++; }
-  // Gives up a command, which the board may have executed. A stop continues.
+  // Gives up a command, which the board may execute. A stop continues.
   void cancel(Ticket ticket, Time now);
-  // Ends every command but stops, or every command but stops and questions.
+  // End every command except stops. give_up() does not end questions either.
   void end_all_but_stops(Outcome outcome, Time now);
   void give_up(Time now);
   void end_all(Time now);
@@ -77,16 +77,16 @@ class CommandsUnderWay {
     CommandResult result;
   };
   std::optional<StepEnd> take_step_end() { return std::exchange(step_end_, {}); }
-  // True if arm() has to wait: for a step, for a stop, or for an earlier E:CLEAR.
+  // True if arm() has to wait for a step, a stop, or an earlier E:CLEAR.
   bool delays_arming();
 
   // --- actions that are due
 
   void expire(Time now);
   void send_queued(Time now);
-  // Ends output commands that are held back and do not wait for an arm().
+  // Ends held back output commands that do not wait for an arm().
   void refuse_held_back(Time now);
-  // Repeats commands that are not confirmed, and the last confirmed stop.
+  // Repeats unconfirmed commands and the last confirmed stop.
   void repeat(Time now);
   Time next();
 
@@ -98,14 +98,14 @@ class CommandsUnderWay {
   void on_identity(const Identity& identity, Time now);
   // `proof`: the command was not executed. `others`: other paths carry duplicates of the command.
   void on_refusal(const Nack& nack, bool proof, bool others, Time now);
-  // True if the command with that number is a setting that the board takes over a cable only.
+  // True if the command with this number is a setting that the board accepts only over a cable.
   bool is_cable_only(std::uint32_t pnum);
 
   // --- for commands that are sent once
 
-  // True if a group, or the rest of a group, waits: later commands must not overtake it.
+  // True if a group or a part of a group waits: later commands must not overtake it.
   bool is_group_ahead();
-  // True if it is known whether the board executes groups. Otherwise the board is asked.
+  // True if the board has reported whether it executes groups. Otherwise Q:ID is sent.
   bool knows_groups(Time now);
   // The newest cause that only E:CLEAR ends; 0: none; unnamed_cause before the first heartbeat.
   std::int32_t cause() const { return cause_; }
@@ -137,7 +137,7 @@ class CommandsUnderWay {
   PendingCommands pending_;
   Ticket next_ticket_ = 1;
   std::int32_t cause_ = Command::unnamed_cause;
-  bool group_waits_ = false;  // for the answer to Q:ID
+  bool group_waits_ = false;  // a group waits for the answer to Q:ID
   std::optional<StepEnd> step_end_;
   // The time of the farewell, and the newest T of a state before it.
   struct Farewell {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The order in which a board's timeout and heartbeat interval are set: one setting at a time, with
-// the interval below the timeout. No step is refused, whatever the board's present values.
+// The steps that set a board's timeout and heartbeat interval: one setting at a time, with the
+// interval below the timeout. No step is refused, for any present values of the board.
 #pragma once
 
 #include <chrono>
@@ -20,7 +20,7 @@ struct LinkTimingStep {
   std::uint32_t ms;
 };
 
-// First an interval below any timeout, then the timeout, then the wanted interval if it differs.
+// First an interval below every timeout, then the timeout, then the interval, if it differs.
 inline std::vector<LinkTimingStep> link_timing_steps(std::chrono::milliseconds timeout,
                                                      std::chrono::milliseconds heartbeat) {
   const auto timeout_ms = static_cast<std::uint32_t>(timeout.count());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session's commands under way: a fixed number of slots, walked in the order of the calls. A slot
-// gets its memory at its first use, because a fleet has many sessions with few commands each.
+// A session's commands under way, in a fixed number of slots and in the order of the calls. A slot
+// is allocated at its first use, because a fleet has many sessions with few commands each.
 #pragma once
 
 #include <algorithm>
@@ -16,40 +16,40 @@
 
 namespace r4 {
 
-// One command, from send() until it ends. The times are the session's.
+// One command, from send() to its end. The times are the session's.
 //     queued --control--> sent --CMD is past it--> overtaken
 //                          |                           |
 //                          +-------DUPLICATE-----------+--> executed
 //
-// It may end in any of these states. It is confirmed when CMD names it, or CMD is past it and it
-// was executed. A confirmed stop has ended for the program, but stays for a while:
+// A command may end in any of these states. It is confirmed when CMD names it, or when CMD has
+// passed it and it was executed. A confirmed stop is repeated for stop_linger:
 //     sent --the board reports it--> lingering --the time is over, another stop, an E:CLEAR--> free
 //
-// A group is one command if the board takes it as one datagram. Otherwise its commands go through
-// these states in turn: each is queued when its predecessor is confirmed.
+// A group in one datagram is one command. Otherwise the commands of the group pass through these
+// states in turn: each command is queued when its predecessor is confirmed.
 struct PendingCommand {
   enum class Stage : std::uint8_t {
     free,
     queued,
     sent,       // and repeated
-    overtaken,  // CMD is past it: the answer to a retry decides
+    overtaken,  // CMD has passed it: the answer to a retry decides
     executed,   // the board answered DUPLICATE
     lingering,  // a confirmed stop, which is repeated
   };
   Stage stage = Stage::free;
   CommandKind kind = CommandKind::heartbeat;
-  bool cable_only = false;  // the board takes this setting over a cable only
+  bool cable_only = false;  // the board accepts this setting only over a cable
   bool is_step = false;     // sent by arm(), not by the program
   std::uint32_t pnum = 0;
   std::uint64_t ticket = 0;
-  std::int32_t cause = Command::unnamed_cause;  // clear: the named cause, once known
+  std::int32_t cause = Command::unnamed_cause;  // clear: the cause that it names
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
-  std::size_t size = 0;  // of the fields in `bytes`: the command; once sent, also PNum and T
-  Command command;       // without its texts; of a group the first, or the one under way
+  std::size_t size = 0;  // of the fields in `bytes`: the command; if sent, also PNum and T
+  Command command;       // without texts; of a group, the first command or the command under way
   Setpoints group;       // empty for a single command
-  // If a group's commands go one after the other: the current command, from 1; else 0.
+  // The current command, from 1, of a group that is sent one by one; else 0.
   std::uint8_t step = 0;
-  // If a group is one datagram: the refused command, from 1.
+  // The refused command, from 1, of a group in one datagram.
   std::uint8_t failed = 0;
   std::array<char, max_datagram> bytes;
 
@@ -64,7 +64,7 @@ class PendingCommands {
  public:
   static constexpr std::size_t max_slots = 128;
 
-  // At most max_slots in all. Stops have their own slots, so commands cannot keep a stop out.
+  // At most max_slots in total. Stops have separate slots, so other commands cannot block a stop.
   PendingCommands(std::size_t commands, std::size_t stops)
       : slots_(commands + stops), commands_(commands), stops_(stops) {
     slots_[0] = std::make_unique<PendingCommand>();
@@ -131,7 +131,7 @@ class PendingCommands {
  private:
   std::size_t& room_for(CommandKind kind) { return kind == CommandKind::stop ? stops_ : commands_; }
 
-  // Commands under way, oldest first, then free slots. Null: never used.
+  // Commands under way, oldest first, then free slots. A slot that was never used is null.
   std::vector<std::unique_ptr<PendingCommand>> slots_;
   std::size_t used_ = 0;
   std::size_t commands_, stops_;  // free slots

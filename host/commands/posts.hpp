@@ -19,18 +19,18 @@ class Posts {
   Posts(Effects& effects, Outbox& outbox, Statistics& counts)
       : effects_(effects), outbox_(outbox), counts_(counts) {}
 
-  // `sent`: the datagram is among the effects, and result() returns the final result.
+  // After `sent`, perform the effects; then result() returns the final result.
   PostResult send(const Command& command, Time now);
   PostResult send(const Setpoints& group, Time now);
   void on_sent(const Sending& sending, SendResult result) { delivery_.on_sent(sending, result); }
-  // After the effects of the last post have been performed.
+  // Call it after the effects of the last post.
   PostResult result();
   bool is_clear() const { return kind_ == CommandKind::clear; }
-  // The board has proved that it did not execute that command.
+  // `nack` proves that the board did not execute the command.
   void on_refusal(const Nack& nack);
 
  private:
-  // A command, or the first command of a group, that the board may still refuse.
+  // A command, or the first command of a group, that the board may refuse.
   struct Posted {
     bool open = false;
     bool is_group = false;
@@ -39,7 +39,7 @@ class Posts {
   };
 
   PostResult begin(Outbox::Sent sent, const Command& command, bool is_group);
-  // Takes the post with that number out of the memory; null if there is none.
+  // Removes the post with this number; null if there is none.
   const Posted* take(std::uint32_t pnum);
 
   Effects& effects_;
@@ -47,7 +47,7 @@ class Posts {
   Statistics& counts_;
   Delivery delivery_;
   CommandKind kind_ = CommandKind::heartbeat;
-  // As many as the board remembers, by packet number. Empty until the first post or group.
+  // By packet number; as many as the board remembers. Empty until the first post or group.
   std::vector<Posted> posted_;
   std::vector<Setpoints> groups_;
 };

@@ -11,7 +11,7 @@ namespace r4 {
 
 namespace {
 
-// Why the command may not join a group that already has `others` commands.
+// Why the command cannot join a group with `others` commands.
 Problem bad_group_member(const Command& command, std::size_t others) {
   Problem problem{ErrorKind::usage, shown(command), "", ""};
   if (!joins_groups(command.kind)) {

@@ -83,7 +83,7 @@ Twist Ackermann::twist(const Command& command) const {
           command.speed_m_s * std::tan(command.steering_rad) / geometry_.wheelbase_m};
 }
 
-// Each wheel is at a right angle to the line from the turning centre, which lies
+// Each wheel is at a right angle to the line from the turning centre. The turning centre is
 // wheelbase / tan(steering) to the left of the rear axle's middle.
 Ackermann::FrontWheels Ackermann::front_wheels(double steering_rad) const {
   const double tangent = std::tan(steering_rad);

@@ -32,7 +32,6 @@ FieldSet fields_of(std::string_view names) {
   return fields;
 }
 
-// True for a motor whose duty is commanded, and so known.
 bool is_drive(CommandKind kind) {
   return kind == CommandKind::osmc || kind == CommandKind::dhb12 || kind == CommandKind::bldc;
 }
@@ -84,7 +83,7 @@ void LoopGuard::end(LoopEnd cause, std::string why) {
   why_ = std::move(why);
 }
 
-// A state may come in several datagrams with the same T.
+// A state may arrive in several datagrams with the same T.
 bool LoopGuard::is_ready(const ReceivedState& state) {
   if (got_ms_ != state.t_ms) got_ = FieldSet();
   got_ms_ = state.t_ms;

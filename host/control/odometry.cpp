@@ -32,8 +32,8 @@ void Odometry::advance(double length_m, double turn_rad) {
   const double along_x = std::cos(pose_.yaw_rad + half);
   const double along_y = std::sin(pose_.yaw_rad + half);
 
-  // An error of the earlier angle turns the chord. An error of the step's length shifts the end
-  // along the chord. An error of the step's angle turns the end and, by half, the chord.
+  // An error of the earlier angle turns the chord. An error of the step's length moves the end
+  // along the chord. An error of the step's angle turns the final heading and, by half, the chord.
   const double c_x = -chord * along_y;
   const double c_y = chord * along_x;
   const double length_x = shortening * along_x;

@@ -65,7 +65,7 @@ double Pid::step(double setpoint, double measured, double dt_s) {
   const double wanted = rest + integral_ + more;
   const double most = options_.rate * dt_s;
   const double given = limited(std::clamp(wanted, output_ - most, output_ + most));
-  // While the output is limited, the integral grows only if that leads back into the range.
+  // While the output is limited, the integral changes only towards the range.
   const bool held = (wanted > given && more > 0) || (wanted < given && more < 0);
   if (!held) integral_ += more;
   return output_ = given;

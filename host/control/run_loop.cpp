@@ -11,8 +11,8 @@ namespace {
 using Clock = LoopGuard::Clock;
 using Milliseconds = std::chrono::milliseconds;
 
-constexpr std::size_t waiting_states = 8;  // a state may come in several datagrams
-constexpr Milliseconds look_interval{20};  // between checks of link and arming without a state
+constexpr std::size_t waiting_states = 8;  // a state may arrive in several datagrams
+constexpr Milliseconds look_interval{20};  // period of checks of link and arming without a state
 
 class StepWatchdog {
  public:
@@ -33,16 +33,16 @@ class StepWatchdog {
   bool on_;
 };
 
-// The cause for which this loop may not send output commands; none if it may.
+// Why this loop may not send output commands; none if it may.
 DisarmCause cause_of(const Board& board, const LoopOptions& options) {
   return options.arming == Arming::off ? DisarmCause::none : board.disarmed_by();
 }
 
-// Sets the outputs to `rest`, or makes the board safe. Returns the end of the report's `why`.
+// Sets the outputs to `rest`, or makes the board safe. Returns a text to append to `why`.
 std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest) {
   at_rest = true;
   const auto is_safe = [&] { return cause_of(board, options) != DisarmCause::none; };
-  // A disarmed board's outputs are already safe, and no command would be sent to it.
+  // After a disarming the outputs are already safe, and output commands are refused.
   if (is_safe() && board.disarmed_by() != DisarmCause::not_yet) return {};
   try {
     board.send(options.rest, options.rest_timeout);
@@ -98,7 +98,7 @@ LoopReport run_loop(Board& board, const LoopOptions& options,
         }
         ++report.steps;
         guard.on_commanded(*wanted);
-        // A refused post needs no repeat: the next post is newer, and the guard sees the reason.
+        // A refused post needs no repeat: the next post is newer, and the guard checks the reason.
         if (!wanted->empty()) static_cast<void>(board.post(*wanted));
       } catch (...) {
         thrown = std::current_exception();

@@ -52,7 +52,7 @@ double Wheel::advance(const State& state) {
   newest_ = (newest_ + 1) % most_samples;
   samples_[newest_] = now;
   count_ = std::min(count_ + 1, most_samples);
-  // The newest sample that is at least a window old, or else the oldest.
+  // The newest sample that is at least a window old, else the oldest sample.
   for (std::size_t back = 1; back < count_; ++back) {
     const Sample& then = samples_[(newest_ + most_samples - back) % most_samples];
     const std::uint32_t age_ms = now.t_ms - then.t_ms;

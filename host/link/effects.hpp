@@ -18,7 +18,7 @@
 
 namespace r4 {
 
-// Names a command that a session took; never 0.
+// Identifies a command under way; never 0.
 using Ticket = std::uint64_t;
 
 struct Sending {
@@ -48,16 +48,16 @@ struct CommandEnded {
   Ticket ticket = 0;
   CommandResult result;
 };
-// The board has restarted and kept only its stored settings. Reported before its new state.
+// The board has restarted and kept only its stored settings. Reported before the new state.
 struct BoardRestarted {};
-// The session was armed (cause none) or disarmed.
+// `cause`: none if armed.
 struct ArmingChanged {
   DisarmCause cause = DisarmCause::none;
 };
 struct PostRefused {
   RefusedPost refused;
 };
-// Views in an event point into the datagram received last, and are valid as long as its bytes.
+// Views in an event point into the last received datagram, and are valid as long as its bytes.
 using SessionEvent =
     std::variant<StateCame, HeartbeatCame, BoardIdentified, CommandRefused, BadDatagramCame,
                  LinkChanged, CommandEnded, BoardRestarted, ArmingChanged, PostRefused>;
@@ -72,12 +72,12 @@ class Effects {
     sendings_.push({{path, priority, kind, pnum, {}}, bytes_.size(), datagram.size()});
     bytes_ += datagram;
   }
-  // The datagram received last, which the events are about.
+  // The last received datagram, the subject of the events.
   Datagram& datagram() { return datagram_; }
   void report(const SessionEvent& event) { events_.push(event); }
 
   bool any_sendings() const { return sendings_.any(); }
-  // The datagram is copied to `room`, because the session may add more while a transport sends it.
+  // The datagram is copied to `room`, because the session may add datagrams during the sending.
   Sending take_sending(Room& room) {
     Stored first = sendings_.take();
     bytes_.copy(room.data(), first.size, first.begin);

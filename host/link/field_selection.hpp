@@ -4,13 +4,13 @@
 //     satisfied <------------------------- asking ----------------------------------> unheard
 //         |                                ^    ^                                        |
 //         +--------------------------------+    +----------------------------------------+
-//          no CMD for 200 ms, or no control      the board answers something after all
+//          no CMD for 200 ms, or no control            the board sends an answer
 //
 //     left       the board keeps its own choice of fields, and F is never sent
-//     satisfied  the states bring CMD, and this host is in control
-//     asking     F is sent every 200 ms. Once executed, F proves that the board obeys this host
-//     unheard    the board counts as one of the paper's release, which does not know F. F is still
-//                sent once a second, because a bad line may have lost all five
+//     satisfied  the states have CMD, and this host is in control
+//     asking     F is sent every 200 ms. An executed F proves that the board obeys this host
+//     unheard    the board counts as a board of the paper's release, which does not know F. F is
+//                sent once a second, because a bad path may have lost all five
 #pragma once
 
 #include <cstdint>
@@ -43,7 +43,7 @@ class FieldSelection {
     cmd_seen_ = now;
     on_answer();
   }
-  // The board has answered something. A board of the paper's release never answers.
+  // The board has sent an answer. A board of the paper's release never answers.
   void on_answer() {
     answers_ = true;
     if (stage_ == Stage::unheard) stage_ = Stage::asking;

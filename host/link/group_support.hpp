@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Whether the board executes a group together: the capability `group` in its answer to Q:ID.
-//               I:… with the word
+//               I:… with `group`
 //     unknown ----------------------> together
 //      ^   |                             ^
-//      |   |  I:… without it, or a board that answers nothing at all
+//      |   |  I:… without it, or a board that never answers
 //      |   +---------------------------> apart
 //      |                                 |
 //      +---- the board has restarted ----+
 //
-//     unknown   while a group waits, Q:ID is sent every 100 ms. A bad line may lose many of them,
-//               but commands of a group must not be executed one by one. So a board that has ever
-//               answered anything is asked until it answers
+//     unknown   while a group waits, Q:ID is sent every 100 ms. A bad path may lose many Q:ID, but
+//               the board must not execute the commands one by one. So a board that has ever
+//               answered gets Q:ID until it answers again
 //     together  a group is one datagram
-//     apart     the commands of a group are sent one after the other. A late answer still counts
+//     apart     the commands of a group are sent one after the other. A late answer also counts
 #pragma once
 
 #include <cstdint>
@@ -36,8 +36,8 @@ class GroupSupport {
     state_ = State::unknown;
     unanswered_ = 0;
   }
-  // True if Q:ID is due. Call it while a group waits. `answers`: the board has ever answered
-  // anything. A board that has not (the paper's release) does not answer Q:ID either.
+  // True if Q:ID is due. Call it while a group waits. `answers`: the board has ever sent an answer.
+  // Boards of the paper's release never answer.
   bool ask(bool answers, Time now) {
     if (state_ != State::unknown || now < next_) return false;
     next_ = now + retry;

@@ -7,9 +7,9 @@ namespace r4 {
 
 namespace {
 
-// The board's clock needs more questions than the program asks: at first until the error is small,
-// later whenever the error has grown. The interval is not a whole number of milliseconds, so the
-// answers also show where a millisecond of the board's clock begins.
+// Estimating the board's clock needs more questions than identify_interval gives: first until the
+// error is small, later whenever it has grown. The interval is not a whole number of milliseconds,
+// so the answers also show where a millisecond of the board's clock begins.
 constexpr Time soon_interval{102'300};
 constexpr Time first_goal{500}, later_goal{1'000};
 constexpr int first_questions = 100, questions_in_vain = 10;
@@ -33,7 +33,7 @@ void HeardBoard::on_state(const ReceivedState& state, std::optional<SafeReason> 
   state_.sampled_error = sampled.error ? *sampled.error : ReceivedState::unknown;
   state_.received = ReceivedState::Clock::time_point(now);
   state_.safe = told;
-  // While there is a fault, the field is in every state.
+  // During a fault, every state has the field.
   if (reason && !state_.present.has(StateField::fault)) state_.fault = ChipFault();
 }
 

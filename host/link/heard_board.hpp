@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board as its datagrams show it: the newest state, the clock, and the firmware's capabilities.
-// A restart of the board clears all of these.
+// The board according to its datagrams: the newest state, the clock, and the firmware's
+// capabilities. A restart of the board clears all of them.
 #pragma once
 
 #include <cstdint>
@@ -16,28 +16,28 @@ namespace r4 {
 
 class HeardBoard {
  public:
-  // The relay of the motor supply (paper section 2).
+  // Closes the motor supply (paper section 2).
   static constexpr int supply_relay = 1;
 
-  // `identify_interval`: between two questions Q:ID; 0: no questions.
+  // `identify_interval`: period of Q:ID; 0: Q:ID is not sent.
   explicit HeardBoard(Time identify_interval) : identify_interval_(identify_interval) {}
 
-  // The newest datagram is a heartbeat. `t_ms`: its T; none if the board is booting.
+  // The newest datagram is a heartbeat. `t_ms`: its T; empty if the board is booting.
   void on_heartbeat(SafeReason reason, std::optional<std::uint32_t> t_ms, Time now);
-  // `reason`: why the board is safe; no value if a newer heartbeat has reported it.
+  // `reason`: why the board is safe; empty if a newer heartbeat has reported it.
   void on_state(const ReceivedState& state, std::optional<SafeReason> reason, Time now);
-  // Returns when the question was sent; no value if this session did not ask.
+  // Returns the time of the question; empty if this session did not ask.
   std::optional<Time> on_identity(const Identity& identity, std::uint32_t t_ms, Time now);
   void on_restart();
 
   const ReceivedState& state() const { return state_; }
   const BoardClock& clock() const { return clock_; }
   bool supply_is_open() const { return state_.present.has(StateField::relays) && !supply_closed(); }
-  // True if relay 1 is closed; no value if the newest state does not show it, or the board is safe.
+  // True if relay 1 is closed; empty if the newest state does not show it, or the board is safe.
   std::optional<bool> supply() const;
-  // True if the board obeys a farewell (E:LEAVE), or may obey it.
+  // True if the board obeys or may obey a farewell (E:LEAVE).
   bool may_know_leave() const { return knows_leave_.value_or(confirms()); }
-  // True if the states confirm commands (CMD). The paper's release does not.
+  // True if the states confirm commands (CMD). Boards of the paper's release do not.
   bool confirms() const { return state_.present.has(StateField::cmd); }
   GroupSupport& groups() { return groups_; }
   const GroupSupport& groups() const { return groups_; }
@@ -47,7 +47,7 @@ class HeardBoard {
   // Time::max() for never.
   Time next_question() const;
   void ask(std::uint32_t pnum, Time now);
-  // Another question is sent, for the program or for a group.
+  // A question for the program or for a group was sent.
   void asked(std::uint32_t pnum, Time now);
 
  private:
@@ -59,7 +59,7 @@ class HeardBoard {
   IdentityQuestion question_;
   Time next_question_{0};
   Time newest_question_{0};
-  int questions_of_clock_ = 0;  // sent for the clock since the board started
+  int questions_of_clock_ = 0;  // questions for the clock since the board started
   std::optional<bool> knows_leave_;
   GroupSupport groups_;
 };

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's key, and whether the board accepts it.
 //
-// With a key, every datagram is signed once the board's nonce is known. A board without a nonce has
-// no key and obeys anyone, so it is refused. A board that rejects this host's key, or its lack of a
-// key, does not say so: it takes no heartbeat, or answers AUTH.
+// With a key, every datagram is signed as soon as the board's nonce is known. A board without a
+// nonce has no key and obeys any host, so a host with a key refuses it. A board that rejects this
+// host's key, or its lack of a key, takes no heartbeats or answers AUTH.
 #pragma once
 
 #include <chrono>
@@ -18,7 +18,7 @@ namespace r4 {
 
 class HostKey {
  public:
-  // `clock_start`: when that clock began, in microseconds since 1970.
+  // `clock_start`: the zero of the session's clock, in microseconds since 1970.
   HostKey(const std::optional<Key>& key, Time clock_start) : clock_start_(clock_start) {
     if (key) signer_.emplace(*key);
   }
@@ -29,23 +29,23 @@ class HostKey {
     in_vain_ = 0;
     host_seen_ = now;
   }
-  // The reason in the newest heartbeat. `none`: the board has a host. `link`: it has no host. Any
-  // other reason does not show whether the board still has its last host.
+  // `reason`: of the newest heartbeat. `none`: the board has a host. `link`: the board has no host.
+  // Other reasons do not show whether the board has a host.
   void on_reason(SafeReason reason, Time now) {
     if (reason == SafeReason::none) on_host_seen(now);
     if (reason == SafeReason::link) host_seen_.reset();
     if (host_seen_ && now - *host_seen_ < host_memory) in_vain_ = 0;
   }
   void on_heartbeat_sent() { in_vain_ += asked_for_ && in_vain_ < many ? 1 : 0; }
-  // The board has answered AUTH to a datagram that the right key would have made acceptable.
+  // The board has answered AUTH to a datagram that only a right signature makes acceptable.
   void on_refusal(Time now) { refused_until_ = now + refusal_memory; }
 
   bool has_key() const { return signer_.has_value(); }
-  // True if the board asks for signatures. A board of the paper's release never does.
+  // True if the board requires signatures. Boards of the paper's release never do.
   bool asked_for() const { return asked_for_; }
   // True if only stops may be sent to the board.
   bool refuses_board() const { return has_key() && heard_ && !asked_for_; }
-  // Signs the fields written so far, if there is a key and a nonce. finish() must follow.
+  // Signs the written fields if there is a key and a nonce. finish() must follow.
   void sign(DatagramWriter& writer, Time now);
 
   std::optional<LinkCause> cause(Time now) const;
@@ -59,7 +59,7 @@ class HostKey {
   std::optional<Signer> signer_;
   Time clock_start_;
   bool heard_ = false;
-  bool asked_for_ = false;  // the newest heartbeat asks for signatures
+  bool asked_for_ = false;  // the newest heartbeat requires signatures
   int in_vain_ = 0;         // heartbeats sent since the board last had a host
   std::optional<Time> host_seen_;
   Time refused_until_{0};

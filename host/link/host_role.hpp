@@ -8,9 +8,9 @@
 //      |  300 ms after the last BUSY                      the link goes down
 //      +---------------+---------------------------------------------------+
 //
-//     asking       no proof yet that the board obeys this host
+//     asking       no proof that the board obeys this host
 //     refused      the board has answered BUSY: another host controls it. Leads to controlling if
-//                  the board's times show that CMD is newer than each BUSY
+//                  the board's T shows that CMD is newer than each BUSY
 //     controlling  the board has executed a command of this session since the link came up
 #pragma once
 
@@ -20,7 +20,7 @@ namespace r4 {
 
 class HostRoleMachine {
  public:
-  // The board has answered BUSY, or a transport hears another host in this host's place on a bus.
+  // The board has answered BUSY, or another host uses this host's ids on a bus.
   void on_busy_until(Time until) {
     controlling_ = false;
     refused_until_ = until;
@@ -39,7 +39,7 @@ class HostRoleMachine {
 
  private:
   bool controlling_ = false;
-  Time refused_until_{0};  // later than now only if not controlling
+  Time refused_until_{0};  // only if not controlling
 };
 
 }  // namespace r4

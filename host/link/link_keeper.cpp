@@ -57,7 +57,7 @@ void LinkKeeper::ask_paths(Time now) {
   if (const PathSet due = paths_.to_ask(now); due != 0) {
     outbox_.send(Command::identify(), {.paths = due, .unknown_too = true}, now);
   }
-  if (paths_.poll(now)) link_.on_transport(true);  // the first heartbeat goes out at once
+  if (paths_.poll(now)) link_.on_transport(true);  // sends the first heartbeat at once
 }
 
 void LinkKeeper::keep_alive(Time now) {
@@ -91,7 +91,7 @@ void LinkKeeper::select_fields(Time now) {
 }
 
 Time LinkKeeper::next(Time now) const {
-  // due_in() counts whole milliseconds, so wait for the end of the millisecond.
+  // due_in() counts whole milliseconds.
   Time link = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
   link = std::chrono::floor<std::chrono::milliseconds>(link);
   if (link <= now) link = now + Time{1000};
@@ -101,7 +101,7 @@ Time LinkKeeper::next(Time now) const {
   return std::min(next, paths_.next(now));
 }
 
-// A heartbeat after the farewell would take control again, so no more heartbeats are sent.
+// Ends the heartbeats: a heartbeat after the farewell would take control again.
 void LinkKeeper::leave(Time now) {
   for (std::size_t i = 0; watches() && i < paths_.count(); ++i) {
     outbox_.send(Command::watch(0), {.paths = path_bit(i), .echo = paths_.leases()[i].echo()}, now);
@@ -131,8 +131,8 @@ bool LinkKeeper::is_up() const {
 
 bool LinkKeeper::hears_board() const { return watches() ? is_heard(link_.state()) : is_up(); }
 
-// Commands wait for proof of control: the board has executed this session's F. Earlier the board
-// may not have accepted the session, and a refusal would prove nothing.
+// Commands wait for proof of control: the board has executed this session's F. Before that, the
+// board may not have accepted the session, and a refusal would prove nothing.
 bool LinkKeeper::in_control(Time now) const {
   const FieldSelection::Stage stage = fields_.stage();
   const bool no_proof_to_come =
@@ -152,7 +152,7 @@ LinkStatus LinkKeeper::status(ChipFault fault, Time now) const {
   if (!watches()) {
     causes.set(LinkCause::watchdog, link_.watchdog_expired(to_ms(now)));
     causes.set(LinkCause::callback, held_);
-    // The silence of a lost board does not indicate a wrong key.
+    // A lost board's silence does not indicate a wrong key.
     const std::optional<LinkCause> key = key_.cause(now);
     if (key && link_.state() != HostLinkState::lost) causes.set(*key);
   }

@@ -2,7 +2,7 @@
 // Keeps the link of a session alive: sends heartbeats or a watcher's leases, requests the state
 // fields that the session needs, and decides whether commands may be sent.
 //
-// It joins machines with their own diagrams: protocol/link/host_link.hpp, host_role.hpp,
+// The machines that it joins have their own diagrams: protocol/link/host_link.hpp, host_role.hpp,
 // field_selection.hpp, host_key.hpp, and a watcher's leases (../paths/lease.hpp).
 #pragma once
 
@@ -26,7 +26,7 @@ namespace r4 {
 
 class LinkKeeper {
  public:
-  // All references outlive the keeper.
+  // All references must outlive the keeper.
   LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& key, Paths& paths,
              Outbox& outbox, Statistics& counts);
 
@@ -34,47 +34,47 @@ class LinkKeeper {
 
   void on_transport(std::size_t path, bool up, bool can_ask, Time now);
   void on_transport_trouble(TransportTrouble trouble) { trouble_ = trouble; }
-  // `result`: a path has taken the datagram or refused it.
+  // `result`: whether the path has taken the datagram.
   void on_sent(const Sending& sending, SendResult result, Time now);
-  // The board answered BUSY at its time `t_ms`. Without a time: a transport on CAN hears another
-  // host with this program's ids.
+  // The board answered BUSY at its time `t_ms`. Without `t_ms`, a transport on CAN has received
+  // frames of another host with the same ids.
   void on_busy(std::size_t path, std::optional<std::uint32_t> t_ms, Time now);
-  // A state of the board's time `t_ms` names a command of this session.
+  // A state with the board's time `t_ms` names a command of this session.
   void on_own_command(std::uint32_t t_ms, Time now);
   FieldSelection& fields() { return fields_; }
 
   // --- actions that are due
 
-  // Asks each path's board for its identity. The session begins when the boards are known.
+  // Sends Q:ID on paths whose board is unknown. The session begins when the boards are known.
   void ask_paths(Time now);
   void keep_alive(Time now);
-  // Sends F if the states lack needed fields, or control has to be proved.
+  // Sends F if the states lack needed fields, or to prove control.
   void select_fields(Time now);
-  // When one of these three is due next; Time::max() for never.
+  // When one of these three actions is due; Time::max() for never.
   Time next(Time now) const;
-  // Ends the link: the keeper sends nothing more.
+  // Ends the link: the keeper then sends nothing.
   void leave(Time now);
   void begin_anew();
-  // Holds heartbeats and commands back until it is called with false.
+  // True: holds back heartbeats and commands. False: resumes them.
   void hold(bool held);
 
   // --- the state of the link
 
-  // Applies changes of the link to the role. Call it before the functions below.
+  // Call it before the functions below: applies changes of the link to the role.
   void update() { role_.on_link(is_up()); }
-  // True if the board hears this host.
+  // True if the board receives this host's heartbeats.
   bool is_up() const;
-  // True if the board is heard, even if it does not hear this host.
+  // True if this host receives the board's datagrams; for a controlling host, as is_up().
   bool hears_board() const;
   // True if commands may be sent at once: the link is up, the board has executed a command of this
-  // session, and neither a callback nor the watchdog holds the session back.
+  // session, and neither a callback nor the watchdog holds commands back.
   bool in_control(Time now) const;
   bool controls() const { return role_.controlling(); }
   bool is_leaving() const { return leaving_; }
   LinkStatus status(ChipFault fault, Time now) const;
 
-  // Adds the needed fields to a command that chooses fields, and remembers the choice. Other
-  // commands are unchanged. The text is valid until the next call.
+  // Adds the needed fields to an F, and remembers the choice. Other commands are unchanged. The
+  // text is valid until the next call.
   Command with_needed_fields(const Command& command);
 
  private:

@@ -48,8 +48,8 @@ PathSet Outbox::send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnu
   return over;
 }
 
-// Each path has its own signature, which proves that path (docs/reference/protocol.md, "Paths"). A
-// watcher's datagrams need no signature. False if the datagram would be too long.
+// Signs for each path separately (docs/reference/protocol.md, "Paths"). A watcher's datagrams need
+// no signature. False if the datagram would be too long.
 bool Outbox::send_over(std::size_t path, DatagramWriter& writer, CommandKind kind,
                        std::uint32_t pnum, Priority priority, Time now) {
   const std::size_t size = writer.size();

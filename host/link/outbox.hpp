@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes and signs the datagrams of a session, each once for every path that it takes.
+// Writes the datagrams of a session, and signs each datagram for every path.
 #pragma once
 
 #include <cstddef>
@@ -25,8 +25,8 @@ class Outbox {
   struct Way {
     Priority priority = Priority::normal;
     PathSet paths = all_paths;
-    std::optional<std::uint32_t> echo{};  // the T that it carries, in ms; none: the host's time
-    // Also over paths whose board is unknown, and to a board without a key.
+    std::optional<std::uint32_t> echo{};  // T of the datagram, ms; empty: the host's time
+    // Also sends over paths whose board is unknown, and to a board without a key.
     bool unknown_too = false;
   };
   struct Sent {
@@ -39,18 +39,18 @@ class Outbox {
 
   Sent send(const Command& command, Way way, Time now);
   Sent send(const Setpoints& group, Time now);
-  // Sends a stamped command. A stop goes to every path. Other commands go to the paths that lead to
-  // the session's board, if that board has this host's key.
+  // Sends a stamped command. A stop is sent on every path. Other commands are sent on paths to the
+  // session's board, unless the host has a key and the board has none.
   PathSet send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, Way way, Time now);
 
-  // Writes SID, PNum and, in a datagram that echoes a T, T.
+  // Writes SID, PNum and, in a datagram with an echo, T.
   void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
              std::uint32_t t_ms) const;
 
   BoardRole role() const { return role_; }
   void change_role(BoardRole role) { role_ = role; }
   bool watches() const { return role_ == BoardRole::watch; }
-  // The id in this session's datagrams. A watcher has none.
+  // The SID of this session's datagrams; no_session for a watcher.
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
 
  private:
@@ -69,7 +69,7 @@ class Delivery {
   void begin(Outbox::Sent sent);
   bool on_sent(const Sending& sending, SendResult result);
   bool failed() const { return open_ == 0 && result_ != SendResult::sent; }
-  // `sent` once a path has taken it; before that, the first path's answer.
+  // `sent` as soon as one path has taken the datagram; before that, the first path's result.
   SendResult result() const { return result_; }
   std::uint32_t pnum() const { return pnum_; }
 

@@ -7,11 +7,11 @@
 //         +----------- BUSY: full; refused otherwise: unknown -----------+
 //
 //     asking    W is sent every 500 ms; at once with a LEASE to echo, or when a transport comes up
-//     watching  likewise: a lease lasts 2 s. After 1 s without a state it is treated as `asking`:
-//               a refusal counts
+//     watching  as `asking`: a lease lasts 2 s. After 1 s without a state, a refusal has the
+//               same effect as in `asking`
 //     full      the board has no room for another watcher; W is sent once a second
-//     unknown   the board does not know watchers; W is sent once a second, as another board may
-//               replace it
+//     unknown   the board does not support watchers; W is sent once a second, because another board
+//               may replace it
 #pragma once
 
 #include <algorithm>
@@ -44,7 +44,7 @@ class Lease {
     if (nack.lease != 0) {
       echo_ = nack.lease;
       renew(now);
-    } else if (!streaming(now)) {  // else a controlling host causes the states
+    } else if (!streaming(now)) {  // otherwise the states come for the controlling host
       state_ = nack.code == Refusal::busy ? State::full : State::unknown;
     }
   }

@@ -15,7 +15,7 @@ namespace r4 {
 using PathSet = std::uint8_t;
 constexpr PathSet path_bit(std::size_t index) { return static_cast<PathSet>(1U << index); }
 
-// The board's T, extrapolated from a received T: late by that datagram's delay, never ahead.
+// The board's T, extrapolated from a received T: late by the datagram's delay, never ahead.
 class PathClock {
  public:
   bool known() const { return known_; }
@@ -25,19 +25,19 @@ class PathClock {
     board_ms_ = t_ms;
     at_ms_ = to_ms(now);
   }
-  // How far `t_ms` is ahead of this clock at that time, in ms.
+  // How far `t_ms` is ahead of this clock at the time `at`, in ms.
   std::int32_t ahead(std::uint32_t t_ms, Time at) const {
     return static_cast<std::int32_t>(t_ms - (board_ms_ + (to_ms(at) - at_ms_)));
   }
-  // True if a T after `since` may be of this boot: at most `late_ms` late, not from the future.
+  // True if a T sent after `since` may be of this boot: at most `late_ms` late, not in the future.
   bool fits(std::uint32_t t_ms, Time since, Time now, std::int32_t late_ms) const {
     return ahead(t_ms, since) >= -late_ms && ahead(t_ms, now) <= tolerance_ms;
   }
 
   // A larger difference means another boot.
   static constexpr std::int32_t tolerance_ms = 10'000;
-  // How late a T may be after a heartbeat `PNum:0;T:0`, or in an answer. Small, because the paper's
-  // boards count T from 0 at each boot: after a quick restart T is only a little smaller.
+  // The allowed delay of a T after a heartbeat `PNum:0;T:0`, or in an answer. Small, because the
+  // paper's boards count T from 0: after a quick restart, T is only slightly smaller.
   static constexpr std::int32_t restart_tolerance_ms = 1'000;
 
  private:
@@ -49,7 +49,7 @@ class PathClock {
 struct PathQuestions {
   IdentityQuestion open;
   bool answered = false;  // since the transport came up
-  bool in_doubt = false;  // a T that did not fit came after the newest question
+  bool in_doubt = false;  // a T that does not fit came after the newest question
   int unanswered = 0;     // questions in doubt since the last answer
   Time asked_at{0};
   Time ask_at{0};
@@ -58,16 +58,16 @@ struct PathQuestions {
 
 struct PathBusy {
   Time until{0};
-  // The T of the board's newest BUSY; no value if this program's transport heard another host.
+  // T of the board's newest BUSY; empty if the transport received another host's frames.
   std::optional<std::uint32_t> board_ms;
 };
 
 struct Path {
   bool up = false;
   bool can_ask = true;
-  bool known = false;       // leads to the session's board
-  bool other = false;       // leads to another board
-  bool connecting = false;  // its last heartbeat had `PNum:0`
+  bool known = false;  // leads to the session's board
+  bool other = false;
+  bool connecting = false;  // the last heartbeat had `PNum:0`
   std::uint32_t boot = 0;
   PathClock clock;
   Time heard{0};

@@ -28,7 +28,7 @@ void PathNews::restart(std::size_t index) {
   if (tracker.started()) tracker.restart();
 }
 
-// True if T is newer, or equal with a newer number on the same path. Then it becomes the newest.
+// If T is newer, or equal with a newer number on the same path, sets `newest` and returns true.
 bool PathNews::is_new(std::optional<First>& newest, std::size_t path, std::uint32_t t_ms) const {
   const std::uint32_t pnum = paths_[path].pnum;
   const bool fresh = !newest || newer(t_ms, newest->t_ms) ||
@@ -62,7 +62,7 @@ bool PathNews::take_state(std::size_t path, std::uint32_t t_ms, FieldSet present
   return fresh;
 }
 
-// A heartbeat overtakes the states in a queue, also a state of the same millisecond.
+// A heartbeat may overtake queued states, also a state of the same millisecond.
 bool PathNews::is_newest(std::size_t path, std::uint32_t t_ms) {
   const std::optional<First>& known = newest_.any;
   const std::uint32_t pnum = paths_[path].pnum;
@@ -73,7 +73,7 @@ bool PathNews::is_newest(std::size_t path, std::uint32_t t_ms) {
   return true;
 }
 
-// The board answers a duplicate of a command like the first one, or with DUPLICATE.
+// The board answers a duplicate of a command with the first answer, or with DUPLICATE.
 bool PathNews::is_copy(const Nack& nack) {
   if (nack.code == Refusal::duplicate) return true;
   for (const Told& each : told_) {
@@ -106,7 +106,7 @@ void PathNews::count_gap(Numbers& path) {
   counters_.lost += path.gap - path.others;
 }
 
-// True if it was counted as lost and comes late.
+// If a late packet was counted as lost, corrects the count and returns true.
 bool PathNews::take_back(Numbers& path) {
   if (path.arrival != Arrival::late || path.lost == 0) return false;
   --path.lost;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Separates new datagrams from duplicates, and counts lost ones (paths.hpp). T orders datagrams of
-// different paths, packet numbers those of one path within a millisecond.
+// Separates new datagrams from duplicates, and counts lost datagrams (paths.hpp). T orders the
+// datagrams of different paths. Packet numbers order datagrams of one path within a millisecond.
 #pragma once
 
 #include <array>
@@ -23,31 +23,31 @@ class PathNews {
   // --- the packet number of each admitted datagram, before the functions below
 
   void on_number(std::size_t index, std::uint32_t pnum);
-  // An answer is always new. It counts once a state or a heartbeat has come.
+  // An answer is always new. It is counted only after the first state or heartbeat.
   void on_answer(std::size_t index, std::uint32_t pnum);
-  // The next number is unrelated to the last number.
+  // The next number will be unrelated to the last number.
   void restart(std::size_t index);
 
   // --- whether a datagram is new: each of these functions also counts it
 
   // False for a duplicate from another path, and for an older heartbeat.
   bool take_heartbeat(std::size_t path, std::uint32_t t_ms);
-  // False if a newer state is known: an older state never replaces it.
+  // False if a newer state is known.
   bool is_newest_state(std::size_t path, std::uint32_t t_ms);
-  // False for a duplicate. States of one T may each hold a part of the fields: such a state is new
-  // if it brings a field that no state of this T has brought.
+  // False for a duplicate. If several states with one T share the fields, a state is new if it has
+  // a field that the earlier states lack.
   bool take_state(std::size_t path, std::uint32_t t_ms, FieldSet present);
-  // True if no newer datagram is known. Then this datagram is the newest.
+  // True if no newer datagram is known: this datagram becomes the newest.
   bool is_newest(std::size_t path, std::uint32_t t_ms);
-  // True if this answer adds nothing: each path may bring an answer to its duplicate of a command.
+  // True for a repeated answer: each path may carry an answer to a duplicate of a command.
   bool is_copy(const Nack& nack);
 
-  // The board has restarted: its T is unrelated to earlier T.
+  // The board has restarted: the next T is unrelated to earlier T.
   void forget() { newest_ = {}; }
   // The board is booting: its next heartbeat is new.
   void on_connecting() { newest_.any = newest_.heartbeat = std::nullopt; }
 
-  // For the session: `lost` counts datagrams that no path has brought.
+  // For the session: `lost` counts datagrams that arrived on no path.
   const PacketCounters& counters() const { return counters_; }
   const PacketCounters& counters(std::size_t path) const { return paths_[path].tracker.counters(); }
   std::uint64_t copies(std::size_t path) const { return paths_[path].copies; }
@@ -55,14 +55,14 @@ class PathNews {
  private:
   struct Numbers {
     PacketTracker tracker;
-    std::uint32_t pnum = 0;  // of the datagram being handled
+    std::uint32_t pnum = 0;  // of the datagram in process
     Arrival arrival = Arrival::first;
-    std::uint32_t gap = 0;     // missing numbers before it
-    std::uint32_t others = 0;  // datagrams first on other paths since this path's newest
-    std::uint32_t lost = 0;    // counted as lost because of this path
+    std::uint32_t gap = 0;     // missing numbers before this datagram
+    std::uint32_t others = 0;  // datagrams that came first on other paths, since this path's newest
+    std::uint32_t lost = 0;    // lost datagrams in this path's gaps
     std::uint64_t copies = 0;
   };
-  // The newest datagram of a kind, and the path that brought it first.
+  // The newest datagram of a kind, and the path on which it came first.
   struct First {
     std::uint32_t t_ms = 0;
     std::uint32_t pnum = 0;

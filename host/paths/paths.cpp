@@ -35,7 +35,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   if (path.known && first_answer_.count() == 0) first_answer_ = now;
   anew_ = anew_ || all_down();
   if (!up) return;
-  // The numbers may restart, and a lease may have ended.
+  // Numbers may restart, and a lease may have ended.
   news_.restart(index);
   leases_[index].renew(now);
 }
@@ -66,13 +66,13 @@ PathSet Paths::to_ask(Time now) const {
 void Paths::asked(std::size_t index, std::uint32_t pnum, bool sent, Time now) {
   Path& path = paths_[index];
   PathQuestions& questions = path.questions;
-  if (!sent && questions.ask_at > now) return;  // not asked by this class
+  if (!sent && questions.ask_at > now) return;  // the question was not due here
   const Time again = now + (path.other ? ask_other_interval : ask_interval);
   questions.asked_at = now;
   questions.ask_at = path.known && sent ? Time::max() : again;
   if (!sent) return;
   questions.open.asked(pnum, now);
-  // While nothing comes, the board has no way to answer.
+  // Only questions in doubt count: without datagrams the board may be unable to answer.
   questions.unanswered += questions.in_doubt && questions.unanswered < most_unanswered ? 1 : 0;
   questions.in_doubt = false;
 }
@@ -90,12 +90,12 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   Path& path = paths_[index];
   if (!path.up) return Admission::no;
   const std::optional<Time> asked = path.questions.open.answered(identity);
-  // An answer to another program, or a duplicate, proves nothing of the boot.
+  // An answer to another program, or a duplicate, does not prove the boot.
   if (!asked && path.can_ask) return path.known ? Admission::yes : Admission::no;
   const std::string_view id(identity.board_id.data(), identity.board_id.size());
   if (path.board_id != id) path.board_id = id;
-  // The only path may lead to another board later. Beside other paths the id may change until the
-  // session begins, while no other path leads to that board.
+  // The only path may later lead to another board. With other paths, the id may change only before
+  // the session begins, and if no other path leads to the session's board.
   const bool others = (known() & ~path_bit(index)) != 0;
   if (!id_ || is_only() || (!begun_ && !others)) id_ = id;
   path.other = *id_ != id;
@@ -110,9 +110,9 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   path.questions.answered = true;
   path.questions.unanswered = 0;
   path.questions.round_trip = now - *asked;
-  // Of two boots, the later one answers a question that was asked after the answer of the earlier.
+  // An answer is of a later boot if its question was sent after the answer of the known boot.
   const bool later = *asked > proven_;
-  // The answer was sent between the question and now, which bounds its T closely.
+  // The answer was sent between the question and now, which bounds T.
   const bool same = clock_.known() ? clock_.fits(t_ms, *asked, now, PathClock::restart_tolerance_ms)
                                    : fits_others(path, t_ms, now);
   if (!same && !later) {
@@ -153,7 +153,7 @@ bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
   return path.clock.known() && path.clock.fits(t_ms, now, now, late_of(path));
 }
 
-// True unless another path of this boot contradicts that T.
+// False if another path of this boot contradicts T.
 bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
   return std::all_of(paths_.begin(), paths_.end(), [&](const Path& each) {
     const bool knows = &each != &path && each.known && each.clock.known() && each.boot == boot_;
@@ -161,7 +161,7 @@ bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
   });
 }
 
-// True if a believed path's T fits the session or, before it begins, the other paths' clocks.
+// True if T fits the session's clock or, before the session begins, the clocks of the other paths.
 bool Paths::fits(const Path& path, std::uint32_t t_ms, Time now) const {
   if (!begun_) return fits_others(path, t_ms, now);
   return !clock_.known() || clock_.fits(t_ms, now, now, late_of(path));
@@ -175,7 +175,7 @@ void Paths::set_clock(std::size_t index, std::uint32_t t_ms, Time now) {
   news_.restart(index);
 }
 
-// In whole milliseconds, as HostLink counts, so that the path and the link fall silent together.
+// In whole milliseconds, as in HostLink, so that the path and the link become silent together.
 void Paths::hear(Path& path, Time now) const {
   path.heard = now;
   path.heard_until = std::chrono::floor<std::chrono::milliseconds>(now) + timeout_;
@@ -188,7 +188,7 @@ void Paths::begin_boot(std::uint32_t t_ms, Time now) {
   clock_.set(t_ms, now);
 }
 
-// A path that cannot be asked, with another clock, leads to another board or shows an earlier boot.
+// A listening path with another clock leads to another board or shows an earlier boot.
 void Paths::compare_those_that_listen(std::uint32_t t_ms, Time now) {
   anew_ = false;
   for (Path& each : paths_) {
@@ -213,7 +213,7 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
       return Admission::no;
     }
     if (!fits(path, t_ms, now)) {
-      // The board has restarted, if this path has carried and no other path carries now.
+      // The board has restarted if this path has carried and no other path carries.
       const bool carried = path.clock.known() && path.boot == boot_;
       if (!carried && !anew_) turn_away(path);
       if ((!carried && !anew_) || others_carry(path, now)) return Admission::no;
@@ -232,7 +232,7 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
   return begun_ ? admission : Admission::no;
 }
 
-// While heartbeats of the board are recent, a delayed one must not end the session: ask the board.
+// A delayed heartbeat must not end the session. If the board's heartbeats are recent, Q:ID decides.
 bool Paths::admit_connecting(std::size_t index, Time now) {
   Path& path = paths_[index];
   if (!path.known) return false;
@@ -260,7 +260,7 @@ bool Paths::admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_
       if (path.known) ask_soon(path, now);
       return false;
     }
-    // On a bus the answer to a lease comes before the first state.
+    // On a bus, the answer to a lease comes before the first state.
     if (!path.known || path.clock.known()) return false;
     if (!fits(path, t_ms, now)) {
       if (!anew_) turn_away(path);

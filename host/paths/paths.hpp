@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Decides over which paths a session sends, and which datagrams it admits
-// (docs/how-to/redundancy.md). A part of a session, without I/O. Among the other parts only
-// LinkKeeper uses the number of paths, to send a lease over each.
+// (docs/how-to/redundancy.md). A part of a session, without I/O. Of the other parts, only
+// LinkKeeper uses the number of paths: it sends a lease over each path.
 //             up           its board answers Q:ID             a datagram comes
 //     down -------> asking -----------------------> silent <-------------------> carrying
 //                    |  ^                                    none for the timeout
@@ -9,18 +9,18 @@
 //     answers        v  |  it gives the right id
 //                   other
 //
-// Each state leads to `down`. An answer of another board leads from each to `other`. The only path,
-// and a bus on which this program may not ask, skip `asking`: there is no board to compare with.
+// Each state leads to `down`. An answer of another board leads from each state to `other`. The only
+// path, and a bus on which this program must not send Q:ID, skip `asking`.
 //
-// Before its board has answered, a path carries only the question and stops, and its datagrams are
-// dropped. The first board that answers is the session's, unless all other paths lead to another.
-// The session begins when all paths that are up have answered, or 300 ms after the first answer.
+// Before its board has answered, a path carries only Q:ID and stops, and its datagrams are dropped.
+// The first board that answers is the session's board, unless all other paths lead to another. The
+// session begins when all paths that are up have answered, or 300 ms after the first answer.
 //
 // Packet numbers differ between paths, so the board's time T decides which datagram is newest. Each
-// path keeps the board's clock as that path shows it. A datagram whose T does not fit is late, or
-// the board has restarted: it is dropped, and the board is asked. The answer proves a restart if
-// its T does not fit either, and if the question was sent after the newest answer of the known
-// boot. A board that does not answer questions (the paper's release) is believed without an answer.
+// path has its own estimate of the board's clock. If a datagram's T does not fit, the datagram is
+// late, or the board has restarted: the datagram is dropped, and Q:ID is sent. The answer proves a
+// restart if its T does not fit either, and if the question was sent after the newest answer of the
+// known boot. A board that does not answer Q:ID (the paper's release) is trusted without an answer.
 #pragma once
 
 #include <cstddef>
@@ -38,7 +38,7 @@
 
 namespace r4 {
 
-// More than 40 functions: each fact about one path has a private function.
+// More than 40 functions, because each fact about one path has a private function.
 class Paths {
  public:
   Paths(std::size_t count, LinkTiming timing, const HostLink& link)
@@ -52,13 +52,13 @@ class Paths {
 
   // --- the transports
 
-  // `can_ask`: false for a watcher on a bus, which may not ask. The only path is then believed.
-  // Beside other paths its T must fit the board's clock, which starts at random.
+  // `can_ask`: false for a watcher on a bus, which must not send Q:ID. Then the only path is
+  // trusted. With other paths, T must fit the board's clock, which starts at random.
   void on_transport(std::size_t index, bool up, bool can_ask, Time now);
   bool all_down() const {
     return those([](const Path& path) { return path.up; }) == 0;
   }
-  // A sleep, or days of silence: the board's clock is unknown on every path. The ids stay known.
+  // After a sleep or days of silence, the board's clock is unknown on every path. The ids are kept.
   void on_sleep(Time now);
 
   // --- sending
@@ -70,36 +70,36 @@ class Paths {
   // The paths on which Q:ID is due.
   PathSet to_ask(Time now) const;
   void asked(std::size_t index, std::uint32_t pnum, bool sent, Time now);
-  // Lets time pass. True if the session begins.
+  // True if the session begins.
   bool poll(Time now);
   Time next(Time now) const;
 
-  // --- receiving, in two steps: admit a datagram of the board's present boot, then ask news()
+  // --- receiving, in two steps: admit a datagram of the board's present boot, then call news()
 
   enum class Admission : std::uint8_t {
     no,
-    restarted,  // admitted, and the board has restarted
+    restarted,  // admitted; the board has restarted
     yes,
   };
   Admission admit(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, Time now);
-  // An answer to this session. `counts`: it is numbered with the states.
+  // An answer to this session. `counts`: the answer is numbered with the states.
   bool admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts,
                     Time now);
   Admission admit_identity(std::size_t index, const Identity& identity, std::uint32_t t_ms,
                            Time now);
-  // A heartbeat `PNum:0`, which reports that the board is booting. True if it is believed.
+  // A heartbeat `PNum:0`, which reports that the board is booting. True if admitted.
   bool admit_connecting(std::size_t index, Time now);
 
   PathNews& news() { return news_; }
-  // True if no datagram with a newer T was admitted. Then this T sets the board's clock.
+  // True if no datagram with a newer T was admitted: this T then sets the board's clock.
   bool is_newest(std::size_t index, std::uint32_t t_ms, Time now);
 
   // --- BUSY: another host is in control
 
-  // The board answered BUSY at its time `t_ms`. Without a time: a transport on CAN hears another
-  // host with this program's ids.
+  // The board answered BUSY at its time `t_ms`. Without `t_ms`, a transport on CAN has received
+  // frames of another host with the same ids.
   void on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now);
-  // A state of the board's time `t_ms` names a command of this session, so an older BUSY is void.
+  // A state with the board's time `t_ms` names a command of this session, so an older BUSY is void.
   void on_own_state(std::uint32_t t_ms, Time now) { own_ = {now, t_ms}; }
   // True if BUSY holds on all paths that carry.
   bool all_busy(Time now) const;
@@ -123,11 +123,11 @@ class Paths {
   static constexpr Time ask_interval = std::chrono::milliseconds{100};
   static constexpr Time ask_other_interval = std::chrono::seconds{1};
   static constexpr Time patience = std::chrono::milliseconds{300};
-  // After this many unanswered questions the board is believed without an answer.
+  // After this many unanswered questions the board is trusted without an answer.
   static constexpr int most_unanswered = 10;
-  // Heartbeats go out every 100 ms or more often, and the board answers each.
+  // A heartbeat is sent at least every 100 ms, and the board answers each.
   static constexpr Time busy_memory = std::chrono::milliseconds{300};
-  // T wraps, so BUSY is not compared with an older state.
+  // T wraps, so BUSY is not compared with a state that is older than this.
   static constexpr Time own_state_memory = std::chrono::hours{1};
 
   template <class Predicate>
@@ -172,11 +172,11 @@ class Paths {
   const HostLink& link_;
   std::optional<std::string> id_;  // of the session's board
   bool begun_ = false;
-  bool anew_ = true;  // no datagram since all paths were down
+  bool anew_ = true;  // no datagram has come since all paths were down
   Time first_answer_{0};
   std::uint32_t boot_ = 0;
-  Time proven_{0};   // when the boot was last proved
-  PathClock clock_;  // by the newest T of all paths
+  Time proven_{0};   // the time of the last proof of the boot
+  PathClock clock_;  // from the newest T of all paths
   struct OwnState {
     Time at{0};
     std::uint32_t t_ms = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a session reacts to time and to calls of the program.
+// The calls of the program, and time.
 #include "session.hpp"
 
 #include <algorithm>
@@ -21,10 +21,10 @@ std::uint64_t random_bits() {
   return std::uint64_t{random()} << 32 | random();
 }
 
-// The longest wait when nothing is due: Time::max() overflows when it is converted to nanoseconds.
+// The longest wait. Time::max() would overflow in nanoseconds.
 constexpr Time longest_wait = std::chrono::hours{1};
 
-// The options are checked before their first use: arithmetic with their times could overflow.
+// Called before the first use of the options, because arithmetic with their times could overflow.
 SessionOptions checked(SessionOptions options) {
   require_valid(options);
   if (FieldSet set; !options.fields.empty() && parse_fields(options.fields, set) != Refusal::none) {
@@ -66,11 +66,11 @@ void Session::poll(Time now) {
   keeper_.keep_alive(now);
   commands_.expire(now);
   arming_.expire(now);
-  if (!keeper_.controls()) keeper_.select_fields(now);  // first, when the link comes up
+  if (!keeper_.controls()) keeper_.select_fields(now);  // before commands, when the link comes up
   commands_.send_queued(now);
   advance_arming(now);
   commands_.refuse_held_back(now);
-  commands_.send_queued(now);  // commands that have waited for arm()
+  commands_.send_queued(now);  // commands that waited for arm()
   commands_.repeat(now);
   if (!keeper_.is_leaving() && keeper_.hears_board() && now >= board_.next_question()) {
     board_.ask(outbox_.send(Command::identify(), {}, now).pnum, now);
@@ -105,7 +105,7 @@ void Session::on_transport(std::size_t path, bool up, Time now, bool can_ask) {
   refresh(now);
 }
 
-// A board whose timeout was raised may still be driving: its session ends at once.
+// Ends the session at once, because a board with a longer timeout may be driving.
 void Session::on_sleep(Time now) {
   if (may_say_farewell()) outbox_.send(Command::leave(), {.echo = link_.echo()}, now);
   commands_.forget_stop();
@@ -114,7 +114,7 @@ void Session::on_sleep(Time now) {
   refresh(now);
 }
 
-// The board's next T cannot be compared with earlier T.
+// The board's next T is unrelated to earlier T.
 void Session::forget_board(Time now) {
   link_.begin_anew();
   paths_.on_sleep(now);
@@ -127,8 +127,8 @@ void Session::on_restart(Time now) {
   on_new_boot(now);
 }
 
-// If the board did not report its restart, this host's clock may have stood still instead, and with
-// it the deadlines of commands. Then a new session begins, and the commands end.
+// If the board did not report a restart, this host's clock may have stopped instead, with the
+// deadlines of commands. Then a new session begins, and the commands end.
 void Session::on_new_boot(Time now) {
   board_.on_restart();
   arming_.disarm(DisarmCause::restart);
@@ -162,7 +162,7 @@ Ticket Session::send(const Command& command, Time timeout, Time now) {
   require_valid(command);
   require_control(board_role(), command);
   if (command.kind == CommandKind::stop) {
-    // No command from before a stop may follow it.
+    // A command from before the stop must not follow it.
     end_all_but_stops(Outcome::cancelled, now);
     arming_.disarm(DisarmCause::stop);
   }
@@ -176,7 +176,7 @@ Ticket Session::send(const Setpoints& group, Time timeout, Time now) {
 }
 
 PostResult Session::gate_of_posts(CommandKind kind, Time now) {
-  commands_.send_queued(now);  // earlier commands go first
+  commands_.send_queued(now);  // earlier commands are sent first
   if (!in_control(now)) return PostResult::no_link;
   if (commands_.is_held_back(kind)) {
     ++statistics_.counts.refused;
@@ -197,7 +197,7 @@ PostResult Session::post(const Command& command, Time now) {
 
 PostResult Session::posted() {
   const PostResult result = posts_.result();
-  if (result && posts_.is_clear()) commands_.forget_stop();  // the program does not repeat it
+  if (result && posts_.is_clear()) commands_.forget_stop();  // the posted E:CLEAR clears the stop
   return result;
 }
 
@@ -216,7 +216,7 @@ void Session::cancel(Ticket ticket, Time now) {
   advance_arming(now);
 }
 
-// Also while it is unknown: a board that confirms commands refuses an unknown farewell.
+// May be tried without the capability: a board that confirms commands refuses an unknown farewell.
 bool Session::may_say_farewell() const {
   return keeper_.is_up() && !watches() && board_.may_know_leave();
 }
@@ -270,7 +270,7 @@ void Session::feed(Time now) {
 Statistics Session::statistics(Time now) const {
   Statistics report = statistics_.report(now);
   report.packets = packets();
-  // Restarts of the board only: packet numbers also restart when a transport comes up.
+  // Counts only restarts of the board: packet numbers also restart when a transport comes up.
   report.packets.restarts = link_.restarts();
   report.copies = packets().duplicate;
   report.received -= report.copies;

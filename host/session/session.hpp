@@ -6,7 +6,7 @@
 //                admits    the board's state        control        arming          ends of
 //                                                                                  commands
 //
-// Session owns these parts. receive() and poll() show their order.
+// Session owns these parts. receive() and poll() call them in this order.
 #pragma once
 
 #include <chrono>
@@ -38,10 +38,11 @@
 
 namespace r4 {
 
-// More than 40 functions: most are its interface, and call one part each.
+// More than 40 functions, most of which call one part.
 class Session {
  public:
-  // `random`: 64 random bits a call; default: the system's. Throws Error{usage} for invalid fields.
+  // `random`: returns 64 random bits; default: the system's. Throws Error{usage} for invalid
+  // fields.
   explicit Session(SessionOptions options, BoardRole role = BoardRole::control,
                    std::size_t paths = 1, std::function<std::uint64_t()> random = {});
   Session(const Session&) = delete;
@@ -52,19 +53,18 @@ class Session {
   static constexpr std::size_t max_stops = CommandsUnderWay::max_stops;
 
   // --- effects
-  // After each call that takes a time, perform the sendings, then the reports. Give the result of
-  // each sending to on_sent().
+  // After each call with a time, perform the sendings (with on_sent() for each), then the reports.
   Effects& effects() { return effects_; }
   void on_sent(const Sending& sending, SendResult result, Time now);
 
   // --- events. poll() is needed after each of these.
 
   void receive(std::size_t path, std::string_view bytes, Time now);
-  // At first each path's transport is down. `can_ask`: false if a watcher may not ask (a bus).
+  // Initially every transport is down. `can_ask`: false if a watcher must not send Q:ID (on a bus).
   void on_transport(std::size_t path, bool up, Time now, bool can_ask = true);
   void on_trouble(TransportTrouble trouble) { keeper_.on_transport_trouble(trouble); }
-  // This computer slept for longer than the board waits for its host, while `now` stood still. A
-  // new, disarmed session begins, commands but stops are cancelled, and BoardRestarted reports it.
+  // This computer slept for longer than the board's timeout, while `now` stopped. A new, disarmed
+  // session begins, all commands except stops are cancelled, and BoardRestarted is reported.
   void on_sleep(Time now);
 
   void poll(Time now);
@@ -74,43 +74,44 @@ class Session {
 
   // Throws Error{usage} for a command outside its ranges. Returns 0 if 64 commands are under way.
   // Command::identify(): the answer confirms it, and BoardIdentified follows. Command::stop():
-  // discards all other commands, and is confirmed when the board reports that it has obeyed this
-  // very stop. If 16 stops are under way, it returns 0 but is sent.
+  // cancels all other commands, and is confirmed when the board reports this stop's number. If 16
+  // stops are under way, returns 0 but sends the stop.
   Ticket send(const Command& command, Time timeout, Time now);
-  // Commands that the board executes together or not at all. If the board knows no groups, each
+  // Commands that the board executes together or not at all. For a board without groups, each
   // command is sent when its predecessor is confirmed. Throws Error{usage} for an empty group.
   Ticket send(const Setpoints& group, Time timeout, Time now);
-  // Clears the cause of the safe state, if possible, and closes relay 1, the motor supply.
-  // Confirmed by the board's state. Output commands that are sent after it wait for it.
+  // Clears the cause of the safe state, if possible, and closes relay 1, the motor supply. The
+  // board's state confirms it. Later output commands wait for the end of arm().
   Ticket arm(Time timeout, Time now);
-  // Ends heartbeats and all commands but stops, and sends the farewell: the outputs are safe at
-  // once, and another host need not wait for the timeout. Confirmed by the board's report. Returns
-  // 0 if no board hears it, or the board knows no farewells. Afterwards only stops are sent.
+  // Ends heartbeats and all commands except stops, and sends the farewell: the outputs are safe at
+  // once, and another host need not wait for the timeout. The board's report confirms it. Returns 0
+  // without a link, or if the board does not support the farewell. Afterwards only stops are sent.
   Ticket leave(Time timeout, Time now);
   bool leaving() const { return keeper_.is_leaving(); }
-  // The same, but the commands end as cancelled. After it, change_role() may let the session watch.
+  // As leave(), but the commands end as cancelled, and change_role() may follow.
   Ticket release_control(Time timeout, Time now);
-  // Makes the session control or watch. It is disarmed, has a new id, and every command under way
-  // but stops is cancelled. on_transport() must follow for each path that is up.
+  // The session is then disarmed and has a new id. All commands under way except stops are
+  // cancelled. on_transport() must follow for each path that is up.
   void change_role(BoardRole role, Time now);
-  // Gives up a command, which the board may have executed. A stop continues.
+  // Gives up a command, which the board may execute. A stop continues.
   void cancel(Ticket ticket, Time now);
   void end_all(Time now);
 
-  // Sends once; PostRefused reports a refusal. After `sent`, perform the effects; ask posted().
+  // Sends once; PostRefused reports a refusal. After `sent`, perform the effects, then call
+  // posted().
   PostResult post(const Command& command, Time now);
-  // no_link also while it is unknown whether the board executes groups.
+  // Also no_link until the board has reported whether it executes groups.
   PostResult post(const Setpoints& group, Time now);
   PostResult posted();
-  // True if the board executes no groups: then a group's commands are posted one after the other.
+  // True if the board executes no groups: post a group's commands one after the other.
   bool posts_apart() const { return board_.groups().state() == GroupSupport::State::apart; }
 
   // --- gates
 
-  // The application watchdog: without feed() for `period` heartbeats and commands stop. 0: off.
+  // The application watchdog: without feed() for `period`, heartbeats and commands stop. 0: off.
   void watchdog(std::chrono::milliseconds period, Time now);
   void feed(Time now);
-  // Holds back heartbeats and commands until it is called with false.
+  // True: holds back heartbeats and commands. False: resumes them.
   void hold(bool held, Time now);
 
   // --- reports
@@ -119,8 +120,8 @@ class Session {
   const LinkStatus& link() const { return status_; }
   bool in_control(Time now) const { return keeper_.in_control(now); }
   DisarmCause disarmed_by() const { return arming_.cause(); }
-  // True if the board has reported the cause that an E:CLEAR must name. Without it, an E:CLEAR
-  // names the first cause that the board reports.
+  // True after the first heartbeat. Before, an E:CLEAR names the first cause that the board
+  // reports.
   bool knows_cause() const { return commands_.cause() != Command::unnamed_cause; }
   const ReceivedState& state() const { return board_.state(); }
   // The requested fields, as in F; empty: the board keeps its own choice.
@@ -168,7 +169,7 @@ class Session {
   LinkStatus status_;
 };
 
-// Posts a command or a group. If the board knows no groups, a group's commands go one after the
+// Posts a command or a group. For a board without groups, the commands are posted one after the
 // other, up to the first that is not sent. send_all() sends the effects, and may advance `now`.
 template <class What, class SendAll>
 PostResult post_by(Session& session, const What& what, const Time& now, SendAll send_all) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a session handles a datagram of the board. Each function first decides whether the datagram
-// counts, then updates the board and the link, then the commands, and reports last.
+// The datagrams of the board. Each function first decides whether the datagram counts, then updates
+// the board and the link, then the commands, and then reports.
 #include "../../protocol/link/board_link.hpp"
 #include "../../protocol/messages/state_fields.hpp"
 #include "session.hpp"
@@ -51,7 +51,7 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
 
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   statistics_.on_state(fresh.t_ms, now);
-  // An overtaken state is still the newest state, but the heartbeat's reason is newer.
+  // If a heartbeat has overtaken this state, the heartbeat's reason is newer.
   const bool newest = paths_.is_newest(path, t_ms, now);
   if (newest) {
     link_.on_reason(reason, to_ms(now));
@@ -81,7 +81,7 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   bool taken = false;
   if (booting) {
-    // On a bus a watcher also hears this heartbeat for hosts, and relies on states instead.
+    // On a bus, a watcher also receives this heartbeat for hosts, and uses the states instead.
     const bool for_hosts = watches() && paths_.leases().streaming(now);
     taken = !for_hosts && paths_.admit_connecting(path, now);
   } else {
@@ -90,7 +90,7 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
     taken = admission != Paths::Admission::no && paths_.news().take_heartbeat(path, t_ms);
   }
   if (!taken) {
-    if (paths_.is_known(path)) commands_.on_stop(report, now);  // the stop's number is proof enough
+    if (paths_.is_known(path)) commands_.on_stop(report, now);  // the stop's number proves the stop
     return refresh(now);
   }
   const bool newest = booting || paths_.is_newest(path, t_ms, now);
@@ -117,7 +117,7 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
 void Session::on_identity(std::size_t path, const Datagram& datagram, Time now) {
   Identity identity;
   if (!read_identity(datagram, identity)) return;
-  if (!watches() && identity.sid != outbox_.session_id()) return;  // an answer to another host
+  if (!watches() && identity.sid != outbox_.session_id()) return;
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   const Paths::Admission admission = paths_.admit_identity(path, identity, t_ms, now);
   if (admission == Paths::Admission::no) return refresh(now);
@@ -133,7 +133,7 @@ void Session::on_identity(std::size_t path, const Datagram& datagram, Time now) 
   commands_.on_identity(identity, now);
 }
 
-// True if it is numbered with the states. Answers to hosts without control have their own numbers.
+// True if it is numbered with the states. Answers to hosts without control have separate numbers.
 bool Session::counts(const Identity& identity) const {
   const bool to_watcher = watches() && identity.sid == no_session;
   return to_watcher || !(identity.has_busy && identity.busy);
@@ -145,7 +145,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   if (!paths_.admit_answer(path, datagram.pnum(), t_ms, nack.has_session, now)) return;
   if (nack.sid != outbox_.session_id() || !link_.is_taken(nack.pnum)) {
-    // A watcher hears answers to other hosts on a bus, a shared transport and in a recording.
+    // A watcher receives answers to other hosts on a bus, on a shared transport and in a recording.
     if (watches() && nack.has_session) link_.on_heard(to_ms(now));
     return refresh(now);
   }
@@ -162,7 +162,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   const bool not_taken = nack.code == Refusal::auth && !commands_.is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
   if (!paths_.news().is_copy(nack)) effects_.report(CommandRefused{nack});
-  // AUTH refuses one duplicate. A repetition or another path's duplicate may have been executed.
+  // AUTH refuses one duplicate. A repetition or a duplicate on another path may have been executed.
   const bool others = (paths_.speaking() & ~path_bit(path)) != 0;
   const bool other_copy = nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
   const bool proof = !other_copy && is_proof(nack);
@@ -172,7 +172,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   refresh(now);
 }
 
-// Of a watcher's commands, the board refuses only leases. The link's status reports these codes.
+// The board refuses no other command of a watcher. The link's status reports the codes below.
 void Session::on_lease_refused(std::size_t path, const Nack& nack, Time now) {
   paths_.leases()[path].on_refusal(nack, now);
   const bool in_status =
@@ -180,10 +180,10 @@ void Session::on_lease_refused(std::size_t path, const Nack& nack, Time now) {
   if (!in_status) effects_.report(CommandRefused{nack});
 }
 
-// True if the refusal proves that the command was not executed: only while the board remembers its
-// executed commands, in one session and for a limited count. Otherwise the deadline decides.
+// True if the refusal proves that the command was not executed. The board remembers a limited
+// number of executed commands of one session. Without proof, the deadline decides.
 bool Session::is_proof(const Nack& nack) const {
-  // Compared by the distance to the newest: a session may be older than half of all numbers.
+  // Distances to the newest number, because a session may be older than half of all numbers.
   const std::uint32_t since_command = link_.last_pnum() - nack.pnum;
   const std::uint32_t since_session = link_.last_pnum() - nack.session;
   return nack.has_session && link_.is_taken(nack.session) && since_session > since_command &&

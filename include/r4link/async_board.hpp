@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::AsyncBoard: a board for programs that have an Asio loop of their own.
+// r4::AsyncBoard: a board for programs with an Asio loop.
 //
 //     asio::io_context io;
 //     r4::AsyncBoard board(io, "serial:auto");       // or io.get_executor()
@@ -8,18 +8,18 @@
 //                      [](const r4::CommandResult& result) { … });
 //     io.run();
 //
-// Call every function on the thread of the io_context, or before it runs; callbacks run on that
+// Call every function on the thread of the io_context, or before run(). Callbacks run on this
 // thread. Only open() and close() may block: open() before run() waits up to 5 s for a host name,
 // and both wait for a transport of your own (transports/own_transport.hpp).
 //
 // Completion tokens work: callbacks, asio::use_future, asio::use_awaitable. A handler runs on its
 // associated executor, never inside the call that started it. A failed command is a result, not an
-// exception: explain() (link.hpp) puts it into words. A handler's cancellation slot cancels the
-// command: it is not sent again, but may have been executed. A stop continues; only the wait ends.
+// exception: explain() (link.hpp) describes it. A handler's cancellation slot cancels the command:
+// it is not sent again, but may have been executed. A cancelled stop continues; only the wait ends.
 //
-// Callbacks and handlers may call any function here and may destroy the board. An exception from
-// one leaves io.run(), as from any Asio handler. Reception and timers continue when run() is called
-// again. The steady state allocates nothing.
+// Callbacks and handlers may call any function here and may destroy the board. An exception from a
+// callback or handler leaves io.run(), as from any Asio handler. Reception and timers continue when
+// run() is called again. In the steady state nothing is allocated.
 #pragma once
 
 #include <asio/associated_allocator.hpp>
@@ -62,7 +62,7 @@ class AsyncBoard {
   AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), url, std::move(options)) {}
   // Over one to four paths to the same board (docs/how-to/redundancy.md). Throws Error{usage} also
-  // for a duplicate, and for sim: and replay:, which are boards of their own.
+  // for a duplicate URL, and for sim: and replay:, which are separate boards.
   AsyncBoard(const executor_type& executor, const std::vector<std::string>& urls,
              BoardOptions options = {});
   AsyncBoard(asio::io_context& io, const std::vector<std::string>& urls, BoardOptions options = {})
@@ -87,29 +87,30 @@ class AsyncBoard {
 
   executor_type get_executor() const noexcept;
 
-  // The first heartbeat is sent at once. A path that cannot be opened is reported by on_event(),
-  // and tried again every second. Throws Error if no path can be opened. Can be called once only.
+  // The first heartbeat is sent at once. If a path cannot be opened, on_event() reports it, and the
+  // board retries every second. Throws Error if no path can be opened. Can be called only once.
   void open();
-  // Cancels commands under way (outcome closed), sends one farewell and closes the transports. The
-  // board goes safe when it hears the farewell, or by its timeout. No callback follows. Idempotent.
+  // Ends commands under way (outcome closed), sends one farewell and closes the transports. The
+  // board goes safe at the farewell, or after its timeout. No callback follows. Idempotent.
   void close();
-  // void(CommandResult). As close(), but repeats the farewell until the board answers, so that it
-  // is free for another host. Confirmed: the outputs are safe and no host controls it. Closed: this
-  // program did not control it, or it knows no farewells. No callback follows; a stop continues.
+  // void(CommandResult). As close(), but repeats the farewell until the board answers: then the
+  // board is free for another host. Confirmed: the outputs are safe, and no host controls the
+  // board. Closed: this program did not control the board, or the board does not support the
+  // farewell. No callback follows; a stop continues.
   template <class Token>
   auto async_close(Duration timeout, Token&& token) {
     require_timeout("async_close()", timeout);
     return initiate<&AsyncBoard::start_close, Token>(token, timeout);
   }
 
-  BoardRole role() const;  // Can be called from any thread.
-  // As Board::take_control(). Throws Error{usage} also if the board is not open or control is being
-  // released, as async_release_control() does.
+  BoardRole role() const;  // any thread
+  // As Board::take_control(). Like async_release_control(), also throws Error{usage} if the board
+  // is not open or control is being released.
   void take_control();
-  // void(CommandResult). Disarms, cancels all commands except stops, and says farewell as
-  // async_close(). The program is always a watcher afterwards. Confirmed: the board is safe and
-  // free, or the program was a watcher. Refused: another host controlled the board. Timed out, and
-  // none (no link, or no farewells known): the board goes safe by its timeout.
+  // void(CommandResult). Disarms, cancels all commands except stops, and sends the farewell as
+  // async_close() does. The program is always a watcher afterwards. Confirmed: the board is safe
+  // and free, or the program was a watcher. Refused: another host controlled the board. Timed out,
+  // and none (no link, or a board without farewells): the board goes safe after its timeout.
   template <class Token>
   auto async_release_control(Duration timeout, Token&& token) {
     require_timeout("async_release_control()", timeout);
@@ -117,21 +118,21 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_release_control, Token>(token, timeout);
   }
 
-  // Throws Error{usage} for a value out of range, and for a secret that other programs would see.
+  // Throws Error{usage} for a value out of range, and for a secret, except over the board's cable.
   void require_sendable(const Command& command) const;
   void require_sendable(const Setpoints& setpoints) const;
 
   // void(CommandResult). Throws as require_sendable(), and for a timeout that is not above 0. A
-  // stop overtakes and cancels all commands, also before the link is up. It is sent with any
-  // timeout, by watchers too. Command::identify() is confirmed by the board's answer, which
-  // identity() returns. Command::clear() clears the stop, watchdog or fault that the board reports.
+  // stop overtakes and cancels all commands, also before the link is up. Watchers may send it too,
+  // and its timeout may be 0. The board's answer confirms Command::identify(), and identity()
+  // returns it. Command::clear() clears the stop, watchdog or fault that the board reports.
   template <class Token>
   auto async_send(const Command& command, Duration timeout, Token&& token) {
     require_sendable(command);
     if (command.kind != CommandKind::stop) require_timeout("async_send()", timeout);
     return initiate<&AsyncBoard::start_send<Command>, Token>(token, command, timeout);
   }
-  // void(CommandResult). As Board::send(); CommandResult::at and CommandResult::executed say which
+  // void(CommandResult). As Board::send(); CommandResult::at and CommandResult::executed show which
   // command failed. Throws Error{usage} for an empty group, and for a timeout that is not above 0.
   template <class Token>
   auto async_send(const Setpoints& setpoints, Duration timeout, Token&& token) {
@@ -139,16 +140,16 @@ class AsyncBoard {
     require_timeout("async_send()", timeout);
     return initiate<&AsyncBoard::start_send<Setpoints>, Token>(token, setpoints, timeout);
   }
-  // void(CommandResult). As Board::arm(). Confirmed: output commands are sent from then on. Not
-  // armed: the cause cannot be cleared, or may be older than the program.
+  // void(CommandResult). As Board::arm(). Confirmed: output commands are sent. Not armed: the cause
+  // cannot be cleared, or may be older than the program.
   template <class Token>
   auto async_arm(Duration timeout, Token&& token) {
     require_timeout("async_arm()", timeout);
     require_control("async_arm()");
     return initiate<&AsyncBoard::start_arm, Token>(token, timeout);
   }
-  // void(CommandResult). Sends a Command::i2c_read(), i2c_write() or i2c_scan() and ends with the
-  // device's answer: CommandResult::transfer. Refused also if the transfer failed. Throws as
+  // void(CommandResult). Sends a Command::i2c_read(), i2c_write() or i2c_scan().
+  // CommandResult::transfer is the device's answer. Refused also if the transfer failed. Throws as
   // require_sendable(), and for another command or a timeout that is not above 0.
   template <class Token>
   auto async_transfer(const Command& command, Duration timeout, Token&& token) {
@@ -157,14 +158,15 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_transfer, Token>(token, command, timeout);
   }
 
-  // void(CommandResult). Confirmed when the board is ACTIVE and takes our commands; for a watcher,
-  // when it is heard. Refused if the paths lead to two boards. A timeout of 0 only looks.
+  // void(CommandResult). Confirmed when the board is ACTIVE and accepts this host's commands; for a
+  // watcher, when the link is active or safe. Refused if the paths lead to two boards. `timeout`
+  // may be 0.
   template <class Token>
   auto async_wait_active(Duration timeout, Token&& token) {
     require_wait("async_wait_active()", timeout);
     return initiate<&AsyncBoard::start_wait_active, Token>(token, timeout);
   }
-  // void(CommandResult). As Board::link_timing(), and throws as it does.
+  // void(CommandResult). As Board::link_timing(), with the same errors.
   template <class Token>
   auto async_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                          Token&& token) {
@@ -174,8 +176,8 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_link_timing, Token>(token, board_timeout, heartbeat,
                                                            timeout);
   }
-  // void(CommandResult). As Board::attach(), then describe(). Confirmed: device.reading(state())
-  // has its values. Otherwise explain(device, result, link()) says why.
+  // void(CommandResult). As Board::attach(), then describe(). Confirmed: device.reading() decodes
+  // the values of each state. Otherwise explain(device, result, link()) describes the reason.
   template <class Token>
   auto async_attach(const Device& device, Duration timeout, Token&& token) {
     require_timeout("async_attach()", timeout);
@@ -186,30 +188,30 @@ class AsyncBoard {
   // Throws Error{usage} for values that async_link_timing() cannot set.
   void require_link_timing(Duration board_timeout, Duration heartbeat) const;
 
-  // Sends once, without confirmation, and returns why it was not sent. If the board refuses it,
-  // on_refused() reports it. A stop is sent as by async_send(), for 1 s. Throws Error{usage}.
+  // Sends once, without confirmation. Returns why a command is not sent. on_refused() reports a
+  // refusal of the board. A stop is sent as by async_send(), for 1 s. Throws Error{usage}.
   PostResult post(const Command& command);
-  // If the board knows no groups, posts one by one, up to the first that is not sent.
+  // For a board without groups, posts the commands one by one, up to the first that is not sent.
   PostResult post(const Setpoints& setpoints);
 
   // The newest values; after close(), the last values.
   const ReceivedState& state() const;
   const LinkStatus& link() const;
-  // True if the link is up and the board takes our commands: they are sent at once.
+  // True if the link is up and the board accepts this host's commands, which are sent at once.
   bool in_control() const;
-  // Why the session is not armed; none if it is armed.
+  // Why output commands are refused; none if armed.
   DisarmCause disarmed_by() const;
   const BoardIdentity& identity() const;
   Statistics statistics() const;
-  const CarrierCounters& carrier_counters() const;  // the sum over all paths
-  const std::string& name() const;                  // of all transports
+  const CarrierCounters& carrier_counters() const;  // summed over all paths
+  const std::string& name() const;                  // the names of all transports
   // The state of each path, in the order of the URLs.
   std::vector<PathStatus> paths() const;
 
-  // Any number of callbacks of each kind, called in the order of adding; the handle ends one.
-  // Unlike those of Board, they get only later events: read state(), link() and disarmed_by()
-  // first. After the event loop was delayed by more than 50 ms, on_state gets only the newest
-  // waiting state. on_nack gets each refusal once, but no DUPLICATE for a retry.
+  // Any number of callbacks of each kind, called in the order in which they were added. The handle
+  // ends its callback. Unlike callbacks of Board, these receive only later events: read state(),
+  // link() and disarmed_by() first. If the event loop was delayed by more than 50 ms, on_state()
+  // reports only the newest waiting state. on_nack() reports each refusal once, but not DUPLICATE.
   Subscription on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
@@ -218,25 +220,25 @@ class AsyncBoard {
   // heartbeats and commands of the controlling host, all stops. Dots replace secrets.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
-  // A path has started or stopped carrying. If a transport reports that it is down, this comes at
-  // once, otherwise after the timeout of SessionOptions::timing.
+  // Called when a path starts or stops carrying: at once if the transport reports that it is down,
+  // otherwise after the timeout of SessionOptions::timing.
   Subscription on_path(std::function<void(const PathStatus&)> callback);
-  // Events of the transport, and a warning if a busy event loop made heartbeats late.
+  // Events of the transports, and a warning if a busy event loop delayed heartbeats.
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // As Board::on_restart(), on_arming() and on_refused().
   Subscription on_restart(std::function<void()> callback);
   Subscription on_arming(std::function<void(DisarmCause)> callback);
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
-  // As Board::record() of a recording.
+  // As Board::record(Recording&).
   void record(Recording& recording);
   // Names a device of this board in later recordings, so that r4 convert can decode it.
   void describe(const Device& device);
 
-  // As Board::watchdog(). feed(): any thread; counts from the loop's next turn.
+  // As Board::watchdog(). feed(): any thread; takes effect in the loop's next turn.
   void watchdog(Duration period);
   void feed();
-  // Stops heartbeats and commands, so that the board goes safe, until it is called with false.
+  // True: holds back heartbeats and commands, so that the board goes safe. False: resumes them.
   void hold_heartbeats(bool held);
 
  private:
@@ -254,7 +256,7 @@ class AsyncBoard {
     std::uint64_t command_;
   };
 
-  // A completion handler of any type, kept until its command ends.
+  // A completion handler of any type, until its command ends.
   class Completion {
    public:
     enum class How : std::uint8_t { dispatch, post };
@@ -312,7 +314,7 @@ class AsyncBoard {
   std::shared_ptr<Impl> impl_;
 };
 
-// The loop of a Board's thread, for a transport made of Asio objects.
+// The loop of a Board's thread, for a transport with Asio objects.
 asio::io_context& context_of(Loop& loop);
 
 template <class Handler>

@@ -4,25 +4,25 @@
 //     r4::Board board("udp://192.168.0.125");
 //     board.wait_active();
 //     board.arm();                                     // closes relay 1, the motor supply
-//     board.osmc(1).set(0.1);                          // the board's state has confirmed it
+//     board.osmc(1).set(0.1);                          // returns when the board has confirmed it
 //     board.on_state([](const r4::State& s) { … });
-//     board.stop();                                    // every output safe, at once
+//     board.stop();                                    // makes every output safe at once
 //
-// A board with a key obeys only hosts that have it: BoardOptions::session.key. If this object is
-// destroyed or its process hangs, the heartbeats stop and the board goes safe.
+// A board with a key obeys only hosts with the same key (BoardOptions::session.key). If this object
+// is destroyed or its process hangs, the heartbeats stop and the board goes safe.
 //
 // Errors are thrown as r4::Error with the thing, the reason and the fix. open and permission: the
 // transport cannot be opened. usage: a wrong URL or a value outside its range. refused: the board
 // refuses a command or does not confirm it in time, or the Board was closed.
 //
-// A timeout counts from the call. A command that was not sent by then is never sent. If it may have
-// been sent, the error says that it may have been executed. Only a stop is sent in any case.
+// A timeout counts from the call. A command that is not sent within its timeout is never sent,
+// except a stop. If a command may have been executed, the error reports that.
 //
-// Callbacks run on a thread of their own, one at a time, beside the thread of the link. They may
-// call any function here, and waiting in them delays no heartbeat. But if a callback does not
-// return within BoardOptions::callback_limit, the heartbeats stop, the board goes safe, and
-// on_event() reports it. Of the states that come while a callback runs, only the newest is passed
-// on; states() has all of them. An exception from a callback ends the program, as from any thread.
+// Callbacks run one at a time on a separate thread. A callback may call any function here and may
+// wait: the heartbeats continue. If a callback does not return within BoardOptions::callback_limit,
+// the heartbeats stop and the board goes safe. When the callback has returned, on_event() reports
+// its run time. While a callback runs, a newer state replaces a waiting one; states() has every
+// state. An exception from a callback ends the program.
 #pragma once
 
 #include <chrono>
@@ -53,7 +53,7 @@ namespace r4 {
 
 class AsyncBoard;
 
-// Callbacks that are added before the transport is opened, so that they miss nothing.
+// Callbacks that are added before the transport opens, so that they receive every event.
 struct BoardCallbacks {
   std::function<void(const ReceivedState&)> on_state;
   std::function<void(const LinkStatus&)> on_link;
@@ -64,16 +64,16 @@ struct BoardCallbacks {
   std::function<void(const RefusedPost&)> on_refused;
 };
 
-// How a queue treats states that come faster than they are taken.
+// How a queue handles states that arrive faster than take() removes them.
 struct StatesOptions {
   // True: no state is dropped silently. When the queue overflows, take() returns the queued states
   // and then throws once. False: the oldest queued state is dropped.
   bool lossless = false;
-  // Queue size in states, 900 bytes each. 0: 1, or if lossless 65536 (11 minutes at 100 Hz).
+  // Queue size in states, 900 bytes each. 0: 1 state, or 65536 if lossless (11 minutes at 100 Hz).
   std::size_t most = 0;
 };
 
-// From Board::states(): the states of a board, one after the other, for a loop of your own.
+// The states of a board in order, for a loop of your own, from Board::states().
 //
 //     r4::States states = board.states({.lossless = true});
 //     while (const auto state = states.take(1s)) …
@@ -83,12 +83,12 @@ class R4LINK_API States {
  public:
   using Duration = std::chrono::milliseconds;
 
-  // Waits for the next state. Empty if none came in time, or if the board was closed and the queue
-  // is empty. If lossless, throws Error{data} once for each gap, then continues after the gap.
+  // Waits for the next state. Empty if no state arrives in time, or if the board was closed and the
+  // queue is empty. If lossless, throws Error{data} once for each gap.
   std::optional<ReceivedState> take(Duration timeout);
   // True if the queue is empty and no more states will come.
   bool ended() const;
-  // How many states were dropped from the queue, or found no room.
+  // The number of dropped states.
   std::uint64_t missed() const;
 
   class R4LINK_PRIVATE Queue;
@@ -107,9 +107,10 @@ class R4LINK_API Board {
   // Opens the transport and starts the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
   // Over one to four paths to the same board: {"serial:auto", "udp://192.168.0.125"}
-  // (docs/how-to/redundancy.md). In one text, '+' joins them. Throws Error{usage} also for a
-  // duplicate, and for sim: and replay:, which are boards of their own. If a path cannot be opened,
-  // on_event reports why, and it is tried again every second. Throws if no path can be opened.
+  // (docs/how-to/redundancy.md). '+' joins several URLs in one text. Throws Error{usage} also for a
+  // duplicate URL, and for sim: and replay:, which are separate boards. If a path cannot be opened,
+  // on_event() reports it, and the Board retries every second. Throws Error if no path can be
+  // opened.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   Board(std::initializer_list<std::string_view> urls, BoardOptions options = {},
@@ -122,68 +123,69 @@ class R4LINK_API Board {
   explicit Board(const std::vector<CarrierMaker>& makers, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   // Opens the only board that discover() finds (discovery/discover.hpp). Blocks for at most 1.3 s.
-  // Throws Error{open} for no board, and Error{usage} with their URLs for several.
+  // Throws Error{open} if it finds no board, and Error{usage} with all URLs for several boards.
   static Board first(BoardOptions options = {}, const DiscoveryOptions& where = {});
   ~Board();
   Board(const Board&) = delete;
   Board& operator=(const Board&) = delete;
 
-  // Stops the heartbeats, says farewell and closes the transport. The board goes safe at once and
-  // is free for another host. If it does not answer, or does not know farewells, it goes safe by
-  // its timeout. Blocks for at most 100 ms; with a transport of your own, up to 1 s more for each.
-  // Also waits for a running callback, and for the disk if record() has opened a file. Calls that
-  // wait in other threads throw Error{refused}. After the return no callback runs, except the one
-  // that called close(). Idempotent. The destructor calls it, and may run while other threads wait.
+  // Stops the heartbeats, sends the farewell and closes the transport. The board goes safe at once
+  // and is free for another host. A board that does not answer or does not support the farewell
+  // goes safe after its timeout. Blocks for at most 100 ms, and for up to 1 s more for each
+  // transport of your own. Also waits for a running callback, and for the disk if record() has
+  // opened a file. Waiting calls in other threads throw Error{refused}. After the return no
+  // callback runs, except a callback that called close(). Idempotent. The destructor calls close(),
+  // and may run while other threads wait.
   void close();
 
-  // The role of this program: BoardOptions::role at first.
+  // The role of this program, initially BoardOptions::role.
   BoardRole role() const;
-  // Controls the board, disarmed: wait_active() waits until the board takes commands of this
-  // program. Callbacks, recordings and what is known of the board stay. Throws Error{refused} if
-  // another program here, its holder(), controls the board: then this one stays a watcher.
+  // Changes the role to control, disarmed. wait_active() waits until the board accepts commands.
+  // Callbacks, recordings and the known state are kept. If another program of this computer
+  // controls the board, throws Error{refused} with its holder(), and this program stays a watcher.
   void take_control();
-  // Disarms and says farewell until the board has answered, so that it is safe and free. The
-  // program is always a watcher afterwards. Calls that wait in other threads throw Error{refused},
-  // and send nothing more. Throws Error{refused} if the board does not answer in time. Then, and
-  // also without a link or if the board knows no farewells, the board goes safe by its timeout.
+  // Disarms and repeats the farewell until the board answers: then the board is safe and free. The
+  // program is always a watcher afterwards. Waiting calls in other threads throw Error{refused} and
+  // send nothing more. Throws Error{refused} if the board does not answer in time. Without an
+  // answer, a link or support for the farewell, the board goes safe after its timeout.
   void release_control(Duration timeout = default_timeout);
 
-  // Waits until the board is ACTIVE under our control; for a watcher, until the board is heard.
-  // Otherwise throws Error{refused} with the state of the link.
+  // Waits until the board is ACTIVE and this program controls it. A watcher waits until the link is
+  // active or safe. Otherwise throws Error{refused} with the state of the link.
   void wait_active(Duration timeout = Duration{3000});
 
   // --- commands: each returns when the board's state confirms it, or throws Error{refused}
 
   // Command::clear() clears the stop, watchdog or fault that the board reports; moves nothing.
   void send(const Command& command, Duration timeout = default_timeout);
-  // Output commands that the board executes together, in one pass over its chips, or not at all,
-  // such as all wheels of a robot. If one fails, the Error names it: Error::at(), from 1. If the
-  // board knows no groups (no `group` in BoardIdentity::capabilities), they are sent one after the
-  // other: those before the failed one were executed, and the Error says so. The board is asked for
-  // this when the link comes up; until it answers, post() of a group returns no_link.
+  // Output commands that the board executes in one pass over its chips, or not at all, such as all
+  // wheels of a robot. If a command fails, Error::at() is its number, from 1. A board without
+  // groups (no `group` in BoardIdentity::capabilities) gets one command after the other. Then the
+  // commands before the failed command were executed, and the Error reports that. Until the board
+  // has reported its capabilities, post() of a group returns no_link.
   void send(const Setpoints& setpoints, Duration timeout = default_timeout);
   // The same from text: "O:358,1,1"; "O:358,1,1;O:358,1,2" is a group.
   void send(std::string_view text, Duration timeout = default_timeout);
-  // Sends once, without confirmation, and returns why it was not sent: also if 256 commands wait.
-  // For streams of setpoints. on_refused() reports commands that the board refuses. A stop is
-  // repeated as by stop_async(). Allocates nothing.
+  // Sends once, without confirmation, for streams of setpoints. If the command is not sent, returns
+  // the reason; queue_full also if 256 commands wait. on_refused() reports commands that the board
+  // refuses. A stop is repeated as by stop_async(). Allocates nothing.
   PostResult post(const Command& command);
   PostResult post(const Setpoints& setpoints);
 
   // Call it before the first output command (O D S R P B Z), and after every safe state except a
-  // lost link. Until then output commands are refused here, so that a program drives only on
+  // lost link. Before that, the Board refuses output commands, so that a program drives only on
   // purpose. Clears a stop, a watchdog or a fault that came while this program controlled the
   // board, then closes relay 1, the motor supply. Throws Error{refused} if the handle is released,
-  // a cause cannot be cleared or a stop comes meanwhile. Throws it also if the cause may be older
-  // than this program, or is a fault with which the board began: clear it on purpose with
-  // Command::clear(), so that a restarted program or board does not drive off. Not needed with
-  // BoardOptions::session.arming = Arming::off.
+  // a cause cannot be cleared or a stop comes meanwhile. Also throws Error{refused} for a cause
+  // that may be older than this program, and for a fault since the board's start. Clear such a
+  // cause on purpose with Command::clear(): a restarted program or board must not drive off. Not
+  // needed with BoardOptions::session.arming = Arming::off.
   void arm(Duration timeout = default_timeout);
   // Why output commands are refused; none if armed.
   DisarmCause disarmed_by() const;
 
-  // Makes every output safe at once, and repeats until the board confirms. Latched until
-  // Command::clear(). If it is not confirmed, the error says to cut the power.
+  // Makes every output safe at once, and repeats until the board confirms. The stop lasts until
+  // Command::clear(). Without a confirmation, the error advises to cut the power.
   void stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
@@ -198,7 +200,7 @@ class R4LINK_API Board {
     void set(Bool, Duration = default_timeout) const = delete;
     template <std::same_as<bool> Bool>
     PostResult post(Bool) const = delete;
-    // The board's own value: `pwm` 0-4095.
+    // `pwm`: 0-4095, the board's unit.
     void set_pwm(int pwm, Direction direction, Duration timeout = default_timeout) const;
     PostResult post_pwm(int pwm, Direction direction) const;
 
@@ -216,12 +218,12 @@ class R4LINK_API Board {
    public:
     void set(Microseconds pulse, Duration timeout = default_timeout) const;  // 0 (off) to 2500
     PostResult post(Microseconds pulse) const;
-    // Call it once before this servo is driven in degrees. The Board keeps the calibration until it
-    // is destroyed, also while the link is lost; it is not sent to the R4 board.
+    // Call it once before you drive this servo in degrees. The Board object keeps the calibration,
+    // also while the link is lost. It is not sent to the R4 board.
     void calibrate(const ServoCalibration& calibration) const;
     // Throws Error{usage} if the servo was not calibrated.
     ServoCalibration calibration() const;
-    // Throw Error{usage} also for an angle outside the calibration's range.
+    // Both also throw Error{usage} for an angle outside the calibration's range.
     void set(Degrees angle, Duration timeout = default_timeout) const;
     PostResult post(Degrees angle) const;
 
@@ -265,7 +267,7 @@ class R4LINK_API Board {
     void set(Bool, bool = false, Duration = default_timeout) const = delete;
     template <std::same_as<bool> Bool>
     PostResult post(Bool, bool = false) const = delete;
-    // The board's own value: `speed` 0-4095.
+    // `speed`: 0-4095, the board's unit.
     void set_pwm(int speed, Direction direction, bool brake = false,
                  Duration timeout = default_timeout) const;
     PostResult post_pwm(int speed, Direction direction, bool brake = false) const;
@@ -278,22 +280,22 @@ class R4LINK_API Board {
   };
 
   // The devices on the user's I2C bus (docs/how-to/devices.md): 7-bit addresses, at most 32 bytes
-  // each way. Calls return when the device has answered. Error{refused}: no answer.
+  // each way. Calls return the device's answer; without one they throw Error{refused}.
   class I2c {
    public:
     using Bytes = std::vector<std::uint8_t>;
-    // Reads a register, named by one or two bytes; {}: no register is named.
+    // Reads a register. `register_bytes`: its number, 1 or 2 bytes; {}: reads without a register.
     Bytes read(int address, const Bytes& register_bytes, int count,
                Duration timeout = default_timeout) const;
-    // Writes, then reads `count` bytes. Needs arm(), because it may move something.
+    // Writes, then reads `count` bytes. Needs arm(), because the device may move something.
     Bytes write(int address, const Bytes& bytes, int count = 0,
                 Duration timeout = default_timeout) const;
     // The addresses that answer, at most 32.
     Bytes scan(Duration timeout = Duration{2000}) const;
     // Sends a Command::i2c_read(), i2c_write() or i2c_scan().
     Bytes transfer(const Command& command, Duration timeout = default_timeout) const;
-    // The board repeats the reading every 5 to 60000 ms, until our session ends, into slot 1-8:
-    // State::i2c and fields("DEFAULT,I2C1").
+    // The board repeats the reading each `period`, 5-60000 ms, until the session ends. `slot`: 1-8.
+    // The bytes are in State::raw.i2c; request them with fields("DEFAULT,I2C1").
     void poll(int slot, int address, const Bytes& register_bytes, int count, Duration period,
               Duration timeout = default_timeout) const;
     void poll_off(int slot, Duration timeout = default_timeout) const;
@@ -305,26 +307,27 @@ class R4LINK_API Board {
   };
   I2c i2c() { return I2c(*this); }
   // Sets up a described device (devices/device.hpp, docs/how-to/described-devices.md): checks its
-  // identity, writes its registers, which needs arm(), and starts the board's readings, until our
-  // session ends. Adds their fields to those of fields(). Call it again after on_restart() and a
-  // lost link. `timeout` is for each step. Throws Error{refused} if the device does not answer or
-  // is another device; finished steps stay. Throws Error{usage} if a device of another address or
-  // name has one of its slots: i2c().poll_off() of that slot frees it.
+  // identity, writes its registers and starts the board's readings. Writing needs arm(). The
+  // readings last until the session ends. Adds their fields to the selection of fields(). Call
+  // attach() again after on_restart() and after a lost link. `timeout` is for each step. Throws
+  // Error{refused} if the device does not answer or is another device; finished steps are not
+  // undone. Throws Error{usage} if a device with another address or name has one of the slots:
+  // i2c().poll_off() frees the slot.
   void attach(const Device& device, Duration timeout = default_timeout);
 
   // One of the user's UARTs, 1 or 2 (docs/how-to/devices.md): setting("uart1", "115200:8N1") turns
-  // it on, fields("DEFAULT,UART1") requests its bytes. They are put together here from the states:
-  // in order, each byte once. Missing bytes are counted.
+  // it on, fields("DEFAULT,UART1") requests its bytes. The Board joins the bytes of successive
+  // states, in order and each byte once. Missing bytes are counted.
   struct UartData {
     std::vector<std::uint8_t> bytes;
-    std::uint64_t lost = 0;  // bytes that are missing before or among these
+    std::uint64_t lost = 0;  // number of bytes missing before or among `bytes`
   };
   class Uart {
    public:
-    // 1 to 48 bytes; confirmed when the board has taken all. Needs arm(): it may move something.
+    // 1-48 bytes. Confirmed when the board has accepted all. Needs arm(): the device may move.
     void write(const std::vector<std::uint8_t>& bytes, Duration timeout = default_timeout) const;
-    // The bytes since the last read(), at most 64 KB: older bytes count as lost. Waits until there
-    // are some; empty if none come in time.
+    // The bytes since the last read(), at most 64 KB; older bytes count as lost. Waits for the
+    // first byte. Empty if no byte arrives in time.
     UartData read(Duration timeout = Duration{0}) const;
     // Calls `callback` for each state with new bytes, on the thread of the callbacks.
     Subscription on_bytes(std::function<void(const UartData&)> callback) const;
@@ -347,76 +350,75 @@ class R4LINK_API Board {
   RelayChannel relay(int channel) { return {*this, channel}; }
   StepperChannel stepper(int channel) { return {*this, channel}; }
   BldcChannel bldc(int channel) { return {*this, channel}; }
-  // The board goes safe if the sensor sees something nearer than `threshold`, 1-400 cm; 0: off.
+  // The board goes safe if the ultrasonic sensor measures less than `threshold`, 1-400 cm; 0: off.
   void proximity(Channel channel, Centimetres threshold, Duration timeout = default_timeout);
   void fields(std::string_view names, Duration timeout = default_timeout);  // "DEFAULT,ENC1"
   void setting(std::string_view key, std::string_view value, Duration timeout = default_timeout);
-  // Sets the board's timeout and heartbeat interval together. One alone may be refused, because the
-  // interval must stay below the timeout. Throws Error{usage} for values outside their ranges, and
-  // for a timeout that our heartbeats (SessionOptions::timing) cannot keep.
+  // Sets the board's timeout and heartbeat interval together. A single setting may be refused,
+  // because the interval must be below the timeout. Throws Error{usage} for values outside their
+  // ranges, and for a timeout that is too short for the host's heartbeats (SessionOptions::timing).
   void link_timing(Duration board_timeout, Duration heartbeat, Duration timeout = default_timeout);
 
   BoardIdentity identify(Duration timeout = default_timeout);
   // The wiring that the board keeps (docs/reference/wiring.md). Only over the board's own cable.
   BoardWiring wiring(Duration timeout = default_timeout);
-  // Checks `wiring`, and gives it to the board, which uses it from its next start on. Throws
+  // Checks `wiring` and sends it to the board, which uses it from its next start. Throws
   // Error{data} for a wiring with a fault. Only over the board's own cable.
   void give_wiring(const Wiring& wiring, Duration timeout = default_timeout);
-  // The newest state, fields merged over all datagrams since the board started. state().age() is
+  // The newest state, with the fields of all datagrams since the board started. state().age() is
   // its age, also while the link is lost.
   ReceivedState state() const;
-  // Waits for a state newer than now. Throws Error{refused} if none comes in time.
+  // Waits for the next state. Throws Error{refused} if no state arrives in time.
   ReceivedState next_state(Duration timeout = default_timeout);
-  // A queue of the states from now on: the newest state, or all.
+  // A queue of the states that arrive after the call: the newest state, or all.
   States states(StatesOptions options = {});
   LinkStatus link() const;
   Statistics statistics() const;
-  // The counters of the transport, summed over all paths.
+  // The counters of the transports, summed over all paths.
   CarrierCounters carrier_counters() const;
-  // The transports' names for people. One may change when a USB board is plugged in again.
+  // The transports' names for people. A name may change when a USB board is plugged in again.
   std::string name() const;
-  // The state of each path, in the order of the URLs; after close(), its last state.
+  // The state of each path, in the order of the URLs; after close(), the last state.
   std::vector<PathStatus> paths() const;
 
-  // Any number of callbacks of each kind, called in the order of adding. Each first gets what is
-  // known: the newest state, the link, the transport's newest up or down and a later warning. The
-  // handle ends it (subscription.hpp); otherwise it lasts as long as the board.
+  // Any number of callbacks of each kind, in the order in which they were added. A new callback
+  // first receives the newest state, link, and transport event (up or down, and a later warning).
+  // It lasts as long as the board, unless its handle ends it (subscription.hpp).
   Subscription on_state(std::function<void(const ReceivedState&)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
-  // A path has started or stopped carrying.
+  // Called when a path starts or stops carrying.
   Subscription on_path(std::function<void(const PathStatus&)> callback);
   // The board restarted, or this computer slept for longer than the board's timeout. The readings
   // of i2c() and attach() end. The fields are requested again, unless SessionOptions::fields is
-  // empty. After a restart, the thresholds of U are 0, and settings (C) may be lost. Comes before
-  // the board's new state.
+  // empty. After a restart, thresholds of U are 0, and settings (C) may be lost. Called before the
+  // new state.
   Subscription on_restart(std::function<void()> callback);
-  // Armed (none), or disarmed and why.
+  // Why output commands are refused; none if armed.
   Subscription on_arming(std::function<void(DisarmCause)> callback);
-  // A posted command was refused by the board, or not sent.
+  // The board refused a posted command, or the command was not sent.
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
   // Records every datagram in both directions to a file (recording.hpp, docs/how-to/recordings.md),
-  // or to a recording that other boards share. It lasts until close(), until the recording is
-  // closed or destroyed, or until another one is named. If it ends by itself because the disk is
-  // full, on_event() reports it, and the link continues. Throws Error if the file cannot be
-  // written.
+  // or to a recording that other boards share. The recording lasts until close(), until it is
+  // closed or destroyed, or until the next record(). If the disk is full, the recording ends,
+  // on_event() reports that, and the link continues. Throws Error if the file cannot be written.
   void record(const std::string& path, RecordingOptions options = {});
   void record(Recording& recording);
 
-  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
-  // Error{usage} for a period below 0 or above one hour. feed() costs no system call. A blocking
-  // call does not feed, because its thread supervises nothing while it waits. If a call outlasts
-  // the period, the heartbeats stop, only a stop is sent, and the call throws at its timeout. So
-  // give the calls of the feeding thread timeouts below the period.
+  // If feed() is not called for `period`, the heartbeats stop and the board goes safe; 0: off.
+  // Throws Error{usage} for a period below 0 or above one hour. feed() makes no system call. A
+  // blocking call does not feed, because its thread does not supervise the robot while it waits. If
+  // a call lasts longer than the period, only a stop is sent, and the call throws at its timeout.
+  // So give the calls of the feeding thread timeouts below the period.
   void watchdog(Duration period);
   void feed();
 
-  // For programs with an event loop (async_board.hpp, with r4link::asio only). Calls `action` on
-  // the thread of the link with the AsyncBoard there, and returns at once. False if the Board is
-  // closed: then `action` is never called. `action` and the handlers of the operations that it
-  // starts must return at once, because heartbeats wait for them. They must not throw, call
-  // functions that wait here, or open or close the AsyncBoard. close() waits for handlers.
+  // For programs with an event loop (async_board.hpp, with r4link::asio only). Calls `action` with
+  // the AsyncBoard on the thread of the link, and returns at once. False if the Board is closed:
+  // then `action` is never called. `action` and the handlers of its operations must return at once,
+  // because heartbeats wait for them. They must not throw, call waiting functions of the Board, or
+  // open or close the AsyncBoard. close() waits for handlers.
   bool post_to_loop(std::function<void(AsyncBoard&)> action);
 
  private:

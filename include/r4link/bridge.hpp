@@ -25,18 +25,18 @@ struct BridgeCounters {
   std::uint64_t stops = 0;   // emergency stops among them
   // Dropped:
   std::uint64_t damaged = 0;      // a wrong checksum, too long, or not a datagram
-  std::uint64_t misdirected = 0;  // only a board sends it but a host did, or the reverse
-  std::uint64_t kept_out = 0;     // from hosts that are not served: docs/how-to/bridge.md
+  std::uint64_t misdirected = 0;  // a host sent a board's datagram, or the reverse
+  std::uint64_t kept_out = 0;     // from hosts that are not served (docs/how-to/bridge.md)
   std::uint64_t refused =
       0;                   // an unsigned command that must be signed, or a setting for a cable only
   std::uint64_t late = 0;  // may have waited for more than 100 ms: the bridge was delayed
-  std::uint64_t undelivered = 0;  // the other side is down or full, or its peer is not known
-  // Of `passed`: replaced by a newer state while it waited, or dropped after 100 ms.
+  std::uint64_t undelivered = 0;  // the other side is down or full, or its peer is unknown
+  // Of `passed`: replaced by a newer state while waiting, or dropped after 100 ms.
   std::uint64_t outdated = 0;
 };
 
 struct BridgeEnd {
-  std::string name;  // of the transport
+  std::string name;  // the transport's name
   bool up = false;
   BridgeCounters from;
 };
@@ -47,20 +47,20 @@ struct BridgeStatus {
 };
 
 struct BridgeEvent {
-  std::size_t pair = 0;  // which board, from 0
+  std::size_t pair = 0;  // number of the board, from 0
   BridgeSide side = BridgeSide::hosts;
   CarrierEvent event;
 };
 
 struct BridgeOptions {
-  // The board's keys, at most four (load_key()). With a key, only heartbeats and commands signed
-  // with it pass, as on a radio; stops and questions always do.
+  // The board's keys, at most four (load_key()). With keys, only heartbeats and commands that are
+  // signed with one of them pass. Stops and questions always pass.
   std::vector<Key> keys;
-  // A board obeys its own cable unsigned. So by default a bridge to a cable passes nothing unsigned
-  // to a board with a key, and is refused on a network without `keys`. True: everyone who reaches
-  // the hosts' side may drive the board. Not together with `keys`.
+  // A board obeys unsigned commands on its own cable. So by default a bridge to a cable passes only
+  // signed commands to a board with a key. On a network it is refused without `keys`. True: every
+  // host that reaches the hosts' side may drive the board. Not together with `keys`.
   bool open = false;
-  // How long a served host may be silent before another is served; at least the board's timeout.
+  // After this silence of the served host, another host is served; at least the board's timeout.
   std::chrono::milliseconds timeout{1000};
   // Called on the bridge's thread; must not block.
   std::function<void(const BridgeEvent&)> on_event;
@@ -71,22 +71,23 @@ struct BridgeOptions {
 //     r4::Bridge bridge("udp://0.0.0.0:2018", "can://can0?node=3");
 //     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
 //
-// It makes no heartbeats: if the host dies, the board goes safe. One host at a time is served, but
-// any E:STOP passes. Waits for a missing device. Cable-only settings (C:key …) never pass.
+// A bridge makes no heartbeats: if the host ends, the board goes safe. It serves one host at a
+// time; an E:STOP of any host passes. It waits for a missing device. Cable-only settings never
+// pass.
 class R4LINK_API Bridge {
  public:
   // `hosts`: the URL to listen on, as for r4 sim. Patterns of equal size are paired in order
-  // (docs/reference/transports.md). Throws Error: usage, permission, and as the transports do.
+  // (docs/reference/transports.md). Throws Error: usage, permission, and errors of the transports.
   Bridge(std::string_view hosts, std::string_view board, BridgeOptions options = {});
   ~Bridge();
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
 
-  // Stops at once; the boards go safe by their timeouts. Idempotent.
+  // Ends the bridge at once; the boards go safe after their timeouts. Idempotent.
   void close();
 
   std::size_t size() const;  // number of boards
-  // The status of each pair, in order; after close(), its last status.
+  // The status of each pair, in order; after close(), the last status.
   std::vector<BridgeStatus> status() const;
 
  private:

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How whole datagrams travel: the interface that every transport implements. A carrier moves
-// datagrams as UDP does: it may lose and reorder them, never blocks and never corrupts them
-// silently (the receiver checks their CRC). It is used on the thread of its event loop (Loop or
-// io_context) only. The first open() throws if the transport cannot be opened. Later trouble is an
-// event, and the carrier reopens when the device returns.
+// The interface of every transport. A carrier moves whole datagrams as UDP does: it may lose and
+// reorder them, and never blocks. The receiver detects damage by the CRC. A carrier is used only on
+// the thread of its event loop (Loop or io_context). The first open() throws if the transport
+// cannot be opened. Later trouble is an event, and the carrier reopens when the device returns.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +20,7 @@ namespace r4 {
 
 enum class BoardRole : std::uint8_t;
 
-// Which end of the link a carrier serves: a host connects to a board, a board listens for hosts.
+// The end of the link that a carrier serves: a host connects to a board, a board listens for hosts.
 enum class Role : std::uint8_t { host, board };
 
 enum class SendResult : std::uint8_t {
@@ -41,7 +40,7 @@ enum class TransportTrouble : std::uint8_t {
 // "none", "foreign frames", "late frames".
 R4LINK_API const char* to_text(TransportTrouble trouble);
 
-// Counters of the transfers in both directions, if a datagram travels in several frames (CAN).
+// Counters of the transfers in both directions, if a datagram is sent in several frames (CAN).
 struct TransferCounters {
   // Failed transfers, whose datagrams are lost:
   std::uint64_t wrong_sequence = 0;  // a frame was lost, duplicated or overtaken
@@ -60,16 +59,16 @@ struct TransferCounters {
 struct CarrierCounters {
   std::uint64_t rx_datagrams = 0;
   std::uint64_t rx_bytes = 0;
-  std::uint64_t rx_oversize = 0;   // lines or packets that were too long and were dropped
-  std::uint64_t rx_foreign = 0;    // packets from another address than the board's, dropped
+  std::uint64_t rx_oversize = 0;   // dropped lines or packets that were too long
+  std::uint64_t rx_foreign = 0;    // dropped packets from an address that is not the board's
   std::uint64_t rx_overflows = 0;  // frames that the system or controller dropped unread (CAN)
   std::uint64_t tx_datagrams = 0;
   std::uint64_t tx_bytes = 0;
   std::uint64_t tx_dropped = 0;  // replaced by a newer state, expired or refused
   std::uint64_t tx_errors = 0;
   std::uint64_t downs = 0;                    // how often the transport went down
-  std::uint64_t ups = 0;                      // how often it came up, the first time included
-  std::optional<TransferCounters> transfers;  // none: a datagram is one packet or line
+  std::uint64_t ups = 0;                      // how often the transport came up
+  std::optional<TransferCounters> transfers;  // none if a datagram is one packet or line
 };
 
 inline TransferCounters& operator+=(TransferCounters& sum, const TransferCounters& more) {
@@ -106,7 +105,7 @@ inline CarrierCounters& operator+=(CarrierCounters& sum, const CarrierCounters& 
 struct CarrierEvent {
   enum class Kind : std::uint8_t { up, down, warning };
   Kind kind = Kind::warning;
-  Problem problem;  // for up: thing is the transport, the rest is empty
+  Problem problem;  // for up: only `thing`, the transport
 };
 
 // "up", "down", "warning"; "unknown" for other numbers.
@@ -133,18 +132,18 @@ class Loop {
 
 class R4LINK_API Carrier {
  public:
-  // Called on the loop's thread, never within send(). May call the carrier, not destroy it.
+  // Called on the loop's thread, never within send(). May call, but not destroy, the carrier.
   class Handler {
    public:
-    // `bytes` are valid during the call. A host has one board: there `from` is `everyone`.
+    // `bytes` are valid during the call. For a host, `from` is `everyone`.
     virtual void on_datagram(std::string_view bytes, Peer from) = 0;
     virtual void on_carrier_event(const CarrierEvent& event) = 0;
-    // All arrived datagrams were passed on, so the newest state is known after a delay. After a
-    // long burst on a byte stream, it may come only with the next datagram.
+    // All arrived datagrams were passed on, so after a delay the newest state is known. After a
+    // long burst on a byte stream, this call may come only with the next datagram.
     virtual void on_drained() {}
-    // A datagram that another program sent to the board, if the transport can hear it.
+    // A datagram that another program sent to the board, if the transport receives such datagrams.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
-    // The first 1024 bytes of input that is too long for a datagram. The rest is dropped.
+    // The first 1024 bytes of input that is too long for a datagram. Further bytes are dropped.
     virtual void on_oversize(std::string_view beginning) { static_cast<void>(beginning); }
 
    protected:
@@ -156,35 +155,35 @@ class R4LINK_API Carrier {
   Carrier(const Carrier&) = delete;
   Carrier& operator=(const Carrier&) = delete;
 
-  // Opens and starts to receive. `handler` must outlive the carrier or its close(). Throws Error. A
-  // transport that is up at once reports `up` before this returns.
+  // Opens and starts to receive. `handler` must remain valid until close() or the destructor.
+  // Throws Error. A transport that is up at once reports `up` before open() returns.
   virtual void open(Handler& handler) = 0;
-  // Stops at once; no call of the handler follows. Idempotent.
+  // Closes at once; the handler is not called afterwards. Idempotent.
   virtual void close() noexcept = 0;
 
   // Sends one datagram of at most max_datagram (1024) bytes, without a terminator. Never blocks;
-  // copies `bytes` if they must wait. A datagram not written within 100 ms is dropped and counted,
-  // unless it is a stop. A host sends to its only board: `everyone`.
+  // copies `bytes` if the datagram must wait. A datagram that is not written within 100 ms is
+  // dropped and counted, unless it is a stop. A host sends to `everyone`.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
   // True if the board cannot distinguish its hosts: on a bus, or through a program that shares
   // its transport. A watcher sends only stops and leases there.
   virtual bool is_shared() const { return false; }
-  // Changes to control or watch. If programs of this computer share the transport, one can control:
-  // if another does, throws Error{refused} with its holder() and changes nothing. Otherwise the
-  // transport may be reopened within the next turns of the loop; trouble with that is an event.
+  // Changes to control or watch. If another program of this computer controls over the shared
+  // transport, throws Error{refused} with its holder() and changes nothing. The transport may be
+  // reopened within the next turns of the loop; trouble with the reopening is an event.
   virtual void change_role(BoardRole role) { static_cast<void>(role); }
 
   virtual bool up() const = 0;
-  // Why datagrams do not pass although the transport is up, as far as the transport knows.
+  // Why datagrams do not pass although the transport is up; none if the reason is unknown.
   virtual TransportTrouble trouble() const { return TransportTrouble::none; }
-  // For people: the URL, with the device that `auto` found.
+  // The URL for people, with the device that `auto` found.
   virtual const std::string& name() const = 0;
   virtual const CarrierCounters& counters() const = 0;
 };
 
-// Makes a transport of your own, not yet open, for the loop of a board's thread. It must not block
-// there: nothing is sent meanwhile. `loop` outlives it.
+// Makes a transport of your own, not yet open, for the loop of a board's thread. The transport must
+// not block this thread, because nothing is sent meanwhile. `loop` outlives the transport.
 using CarrierMaker = std::function<std::unique_ptr<Carrier>(Loop& loop)>;
 
 }  // namespace r4

@@ -46,7 +46,7 @@ struct Duty {
                                                    !std::is_same<Number, bool>::value>>
   constexpr explicit Duty(Number duty) : value(static_cast<double>(duty)) {}
   constexpr bool is_in_range() const { return value >= -1 && value <= 1; }
-  // Rounded to the nearest; outside the range of Pwm if the duty is outside its range.
+  // Rounded to the nearest Pwm. If the duty is out of range, the result is out of the range of Pwm.
   constexpr Pwm pwm() const {
     const double twice = 2 * pwm_max * (value < 0 ? -value : value);
     return Pwm(is_in_range() ? (static_cast<std::int32_t>(twice) + 1) / 2 : pwm_max + 1);
@@ -85,8 +85,8 @@ struct R4LINK_API Command {
   static Command servo(Channel channel, Microseconds pulse);
   static Command relay(Channel channel, bool on);
   static Command stop();
-  // `cause`: the number of the cause to clear, from CAUSE in the board's heartbeats; 0 if they have
-  // none. unnamed_cause: the host does not know cause numbers, or Session fills the number in.
+  // `cause`: the number of the cause to clear, from CAUSE in the board's heartbeats; 0 if the
+  // heartbeats have no CAUSE. unnamed_cause: Session fills in the number, or the command has none.
   static constexpr std::int32_t unnamed_cause = -1;
   static Command clear(std::int32_t cause = unnamed_cause);
   // Ends control: the board is safe at once, and any host may control it.
@@ -99,36 +99,36 @@ struct R4LINK_API Command {
   static Command bldc(Channel channel, Duty duty, bool brake = false) {
     return bldc(channel, duty.pwm(), duty.direction(), brake);
   }
-  // The board goes safe if the sensor sees something nearer than `threshold`, 1-400 cm; 0: off.
+  // The board goes safe if the ultrasonic sensor measures less than `threshold`, 1-400 cm; 0: off.
   static Command proximity(Channel channel, Centimetres threshold);
   static Command fields(Text list);
   static Command setting(Text key, Text value);
   static Command identify();
-  // Asks how the board is wired; only over its own cable.
+  // Requests the board's wiring; only over the board's own cable.
   static Command ask_wiring();
   // The board streams its states to the sender for two seconds, without control; 0 Hz ends that.
-  // `list`: the fields; empty: those that the controlling host has chosen.
+  // `list`: the fields; empty: the fields that the controlling host has chosen.
   static Command watch(std::int32_t rate_hz, Text list = Text());
-  // On the user's I2C bus (docs/how-to/devices.md): 7-bit addresses; bytes as x and two hexadecimal
-  // digits each, "x75", and "x" for none. The answer comes as I2CX in the state.
+  // Transfers on the user's I2C bus (docs/how-to/devices.md). Addresses have 7 bits. Bytes are x
+  // and two hexadecimal digits each, "x75"; "x": no bytes. The answer is I2CX in the state.
   static Command i2c_read(int address, Text register_bytes, int count);
   static Command i2c_write(int address, Text bytes, int count = 0);  // then reads `count` bytes
   static Command i2c_scan();
-  // The board reads every `period_ms` (5-60000) by itself; I2C1 … I2C8 of the state have the bytes.
+  // The board reads the device every `period_ms` (5-60000); I2C1 … I2C8 of states have the bytes.
   static Command i2c_poll(int slot, int address, Text register_bytes, int count, int period_ms);
   static Command i2c_poll_off(int slot);
-  // On one of the user's UARTs: at most uart_max_write bytes.
+  // Sends on one of the user's UARTs: at most uart_max_write bytes.
   static Command uart_write(Channel channel, Text bytes);
-  // One of the user's output voltages, 0-3300 mV; 0 in the safe state.
+  // Sets one of the user's output voltages, 0-3300 mV; 0 in the safe state.
   static Command dac(Channel channel, Millivolts voltage);
 };
 
-// The most commands in one datagram. Several are a group: output commands for different channels,
+// The most commands in one datagram. A group is several output commands for different channels,
 // which are executed together or not at all (docs/reference/protocol.md; setpoints.hpp).
 constexpr int max_group = 16;
 
-// Checks the ranges of a command that a factory has made: Refusal::format, ::channel or ::range if
-// a value is wrong. Settings and names of fields are not checked.
+// Checks the ranges of a command from a factory: Refusal::format, ::channel or ::range if a value
+// is wrong. Settings and names of fields are not checked.
 R4LINK_API Refusal check_command(const Command& command);
 
 }  // namespace r4

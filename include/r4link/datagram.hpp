@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A datagram as it is on the wire, checked and read in place (paper section 4;
-// docs/reference/protocol.md).
+// A datagram on the wire, checked and read in place (paper section 4; docs/reference/protocol.md).
 //
 //     datagram = 1*field "^0x" 1*8HEXDIG "^" [CR] [LF]
 //     field    = name ":" value *("," value) ";"
@@ -8,7 +7,7 @@
 //     value    = *(%x20-7E except ";" "," "^")
 //
 // read_datagram() accepts a whole datagram or nothing. A Datagram is a view: valid as long as the
-// bytes. Reading allocates nothing and takes one pass over the bytes besides the CRC.
+// bytes. Reading allocates nothing. It takes one pass over the bytes, and one for the CRC.
 #pragma once
 
 #include <cstddef>
@@ -26,14 +25,14 @@ constexpr std::size_t max_datagram = 1024;
 enum class ReadError : std::uint8_t {
   none,
   length,  // empty, or longer than max_datagram
-  syntax,  // not of the grammar above
+  syntax,  // does not match the grammar above
   crc,     // the checksum does not match
 };
 
 // "length", "syntax", "crc"; "" for none.
 R4LINK_API const char* to_text(ReadError error);
 
-// The outcome; `position`: byte offset of the error (crc: of the checksum's first digit).
+// `position`: byte offset of the error; for crc, of the checksum's first digit.
 struct ReadResult {
   ReadError error = ReadError::none;
   std::size_t position = 0;
@@ -62,12 +61,11 @@ constexpr bool is_command_letter(char c) {
   return ((c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z')) && c != 'T' && c != 'A';
 }
 
-// True if the name of the field is a command letter.
 inline bool is_command(const Field& field) {
   return field.name().size() == 1 && is_command_letter(field.name()[0]);
 }
 
-// Reads a field without semicolon: "O:358,1,1". False if invalid; `out` is written on success only.
+// Reads a field without semicolon, "O:358,1,1". False if invalid; `out` is written only on success.
 R4LINK_API bool read_field(Text text, Field& out);
 
 class R4LINK_API Datagram {
@@ -94,7 +92,7 @@ class R4LINK_API Datagram {
 
     const char* at_;
     const char* end_;
-    // The ends of names and fields ahead, in the current word.
+    // The ends of the next names and fields, in the current word.
     const std::uint64_t* word_ = nullptr;
     std::uint64_t ends_ = 0;
     const char* word_begin_ = nullptr;
@@ -113,16 +111,16 @@ class R4LINK_API Datagram {
   // The first field of that name; a Field with an empty name if the datagram has none.
   Field find(Text name) const;
 
-  // Of all bytes up to and including the first `^`, as the datagram gives it.
+  // The checksum in the datagram: of all bytes up to and including the first `^`.
   std::uint32_t checksum() const { return checksum_; }
   // PNum and T, if present. A host heartbeat may lack PNum.
   bool has_pnum() const { return has_pnum_; }
   std::uint32_t pnum() const { return pnum_; }
   bool has_time() const { return has_time_; }
   std::uint64_t time_ms() const { return time_ms_; }
-  // The id of its session (SID); no_session if it has none.
+  // The session id (SID); no_session if the datagram has none.
   SessionId session_id() const { return sid_; }
-  // The number of fields whose names are command letters (none or several may be), and the first.
+  // The number of fields whose names are command letters (0 or more), and the first such field.
   int command_count() const { return command_count_; }
   const Field& command() const { return command_; }
 
@@ -143,13 +141,13 @@ class R4LINK_API Datagram {
   bool has_time_ = false;
   int command_count_ = 0;
   Field command_;
-  // Where names and fields end, alternately: bit i of word k is byte 64 k + i of fields_. Only the
-  // words that fields_ needs are written or read.
+  // The ends of names and fields, alternately: bit i of word k is byte 64 k + i of fields_. Only
+  // the words that fields_ needs are written or read.
   static constexpr std::size_t words = max_datagram / 64;
   std::uint64_t ends_[words];
 };
 
-// Index of the lowest set bit; `bits` is not 0. A 32-bit processor's builtin would call a function.
+// `bits` must not be 0. On a 32-bit processor, __builtin_ctzll() would call a function.
 inline int lowest_bit(std::uint64_t bits) {
 #if UINTPTR_MAX > 0xFFFFFFFFU
   return __builtin_ctzll(bits);
@@ -185,9 +183,9 @@ inline void Datagram::Iterator::load() {
                  Text(colon + 1, static_cast<std::size_t>(semicolon - colon - 1)));
 }
 
-// Checks one datagram, with or without terminator, and on success makes `out` a view of it.
-// `syntax` also for a PNum (32 bit) or T (64 bit) that is not a whole number in range, for a SID
-// that is 0 or not 16 hexadecimal digits, and for a duplicate of these.
+// Checks one datagram, with or without a terminator, and on success makes `out` a view of it.
+// `syntax` also for a PNum (32 bit) or T (64 bit) that is not a whole number in range. `syntax`
+// also for a SID that is 0 or not 16 hexadecimal digits, and for a duplicate PNum, T or SID.
 R4LINK_API ReadResult read_datagram(Text bytes, Datagram& out);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The one error type of the host: what is wrong, why, and how to fix it.
+// The error type of the host library: the problem, its reason and its fix.
 #pragma once
 
 #include <cstdint>
@@ -28,21 +28,21 @@ enum class ErrorKind : std::uint8_t {
 enum class Outcome : std::uint8_t {
   none,       // not about a command
   confirmed,  // by the board's state
-  refused,    // the board refused it and did not execute it: see the Refusal; or a transfer failed
+  refused,    // the board refused it and did not execute it (see Refusal), or a transfer failed
               // on its bus, or the link cannot begin
   timed_out,  // not confirmed by the deadline; the board may have executed it
   cancelled,  // ended by a stop, a newer safe cause, another clock of the board, or the program
   closed,     // ended because the board was closed
   blocked,    // the board's thread does not answer: not sent, or not confirmed
-  full,       // not accepted: 64 commands are under way
+  full,       // not accepted, because 64 commands are under way
   not_armed,  // not sent: output commands, or arm() itself, are blocked by the cause in `disarmed`
 };
 
 // "confirmed", "refused", "timed out" …
 R4LINK_API const char* to_text(Outcome outcome);
 
-// Foreign text as one line that is safe for a terminal or a log. Writes as \xNN: control characters
-// (also line feed and tab), invalid UTF-8, text without width or with direction. Idempotent.
+// Foreign text as one line that is safe for a terminal or a log. Control characters (also line feed
+// and tab), invalid UTF-8, and characters without width or with direction become \xNN. Idempotent.
 R4LINK_API std::string printable(std::string_view text);
 
 struct Program {
@@ -55,12 +55,12 @@ struct Problem {
   ErrorKind kind = ErrorKind::open;
   std::string thing;  // the subject: a URL, a device, a command
   std::string reason;
-  std::string fix;  // how to fix it; may be empty
+  std::string fix;  // may be empty
   // If it is about a command:
   Outcome outcome = Outcome::none;
   Refusal refusal = Refusal::none;  // for Outcome::refused
-  std::uint8_t at = 0;              // which command of a group, from 1; 0: no particular one
-  // The program that controls the transport already, if that is the reason.
+  std::uint8_t at = 0;              // failed command of a group, from 1; 0: no particular one
+  // The program that already controls the transport, if this is the reason.
   std::optional<Program> holder{};
 
   // "thing: reason; fix" as one printable() line.
@@ -84,7 +84,8 @@ class R4LINK_API Error : public std::runtime_error {
   Problem problem_;
 };
 
-// An Asio or library error as a problem of kind open: no thread, descriptor or watch for `thing`.
+// A problem of kind open from an error of Asio or the standard library: the system has no thread,
+// descriptor or watch for `thing`.
 R4LINK_API Problem problem_of(const std::string& thing, const std::system_error& error);
 
 }  // namespace r4

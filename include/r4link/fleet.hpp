@@ -3,22 +3,22 @@
 //
 //     r4::Fleet fleet({"can://can0?node=0-7", "udp://10.0.0.{1-250}?listen=0"});
 //     fleet.wait_active();
-//     fleet.arm().require();                       // throws, naming those that cannot be armed
-//     fleet.post({{0, left}, {1, right}});         // setpoints of two boards, out in one pass
+//     fleet.arm().require();                       // throws if a board is not armed
+//     fleet.post({{0, left}, {1, right}});         // setpoints of two boards, sent in one pass
 //     for (const r4::BoardHealth& each : fleet.health()) …
-//     fleet["can://can0?node=3"].send("S:1500,1");  // one of them
-//     fleet.stop();                                // all of them, at once
+//     fleet["can://can0?node=3"].send("S:1500,1");  // one board
+//     fleet.stop();                                // all boards at once
 //
-// Boards count from 0, in the order of the URLs. A pattern stands for its boards in order
+// Boards count from 0, in the order of the URLs. A pattern stands for several boards in order
 // (docs/how-to/fleet.md). '+' joins the paths to one board:
-// "can://can0?node=0-7+can://can1?node=0-7". All links live on one thread and one loop; boards on
-// one CAN bus share a socket. A silent board does not disturb another. ReceivedState::sampled is
-// comparable across boards.
+// "can://can0?node=0-7+can://can1?node=0-7". All links run on one thread and one loop; boards on
+// one CAN bus share a socket. A silent board does not disturb the links to other boards.
+// ReceivedState::sampled is comparable across boards.
 //
-// Thread-safe; no call blocks the links. As with Board: if this object is destroyed or its process
-// hangs, all boards go safe. A command that was not sent by its timeout is never sent, except a
-// stop. If your thread may hang, use watchdog() and feed(). A problem of the whole call throws
-// r4::Error: usage, or refused after close(). A problem of one board is its entry in the result.
+// Thread-safe; no call blocks the links. If this object is destroyed or its process hangs, all
+// boards go safe. A command that is not sent within its timeout is never sent, except a stop. If
+// your thread may hang, use watchdog() and feed(). A problem of the whole call throws r4::Error:
+// usage, or refused after close(). A problem of one board is an entry in the result.
 #pragma once
 
 #include <chrono>
@@ -47,18 +47,18 @@ struct BoardHealth {
   std::string url;         // as given to Fleet
   BoardIdentity identity;  // empty until the board has answered
   LinkStatus link;
-  bool in_control = false;  // the board takes our commands: they are sent at once
+  bool in_control = false;  // the board accepts this host's commands, which are sent at once
   DisarmCause disarmed_by = DisarmCause::not_yet;
   Statistics statistics;
   std::vector<PathStatus> paths;  // empty if the board has one path only
-  // True if the board is ACTIVE, in control and its commands are sent.
+  // True if the board is ACTIVE and this host controls it, and commands are sent.
   bool well() const { return in_control && link.state == HostLinkState::active && !link.gated(); }
 };
 
 struct FleetResult {
   std::size_t board = 0;
   CommandResult result;
-  Problem problem;  // in words, with the board's URL; empty if confirmed
+  Problem problem;  // with the board's URL; empty if confirmed
   bool confirmed() const { return result.outcome == Outcome::confirmed; }
 };
 
@@ -68,7 +68,8 @@ class R4LINK_API FleetResults {
   explicit FleetResults(std::vector<FleetResult> results) : results_(std::move(results)) {}
   bool all_confirmed() const;
   std::vector<std::size_t> failed() const;  // the numbers of the boards
-  // Throws Error{refused} if one is not confirmed: names the first one, and counts the rest.
+  // If boards have not confirmed, throws Error{refused}: names the first board and counts the other
+  // boards.
   void require() const;
 
   std::size_t size() const { return results_.size(); }
@@ -85,9 +86,9 @@ struct FleetEvent {
     link,       // `link` has changed
     transport,  // `transport` is an event of the transport
     arming,     // `disarmed_by` has changed; none: armed
-    restart,    // as Board::on_restart(): readings end; after a restart, thresholds of U are 0
-    refused,    // the board refused a posted command: `refused`
-    // `count` events were dropped before this one, because next_event() was not called in time
+    restart,    // Board::on_restart()
+    refused,    // the board refused the posted command `refused`
+    // `count` events before this event were dropped, because next_event() was called too late
     missed,
   };
   Kind kind = Kind::link;
@@ -131,8 +132,8 @@ class R4LINK_API Fleet {
   static constexpr Duration default_timeout{1000};
 
   // Opens all transports and starts the links, without waiting for the boards. callback_limit has
-  // no effect; waiting calls call on_wait. Throws Error for a wrong URL or pattern, a duplicate,
-  // and the first transport that cannot be opened.
+  // no effect; waiting calls call on_wait. Throws Error for a wrong URL or pattern, for a
+  // duplicate, and for the first transport that cannot be opened.
   explicit Fleet(const std::vector<std::string>& patterns, BoardOptions options = {});
   ~Fleet();
   Fleet(const Fleet&) = delete;
@@ -143,12 +144,13 @@ class R4LINK_API Fleet {
 
   std::size_t size() const;
   const std::string& url(std::size_t board) const;
-  // The board of that URL, reported name or board id. Throws Error{usage} unless it is exactly one.
+  // The board with this URL, name or board id. Throws Error{usage} unless exactly one matches.
   std::size_t find(std::string_view url_or_name) const;
   FleetBoard operator[](std::size_t board);
   FleetBoard operator[](std::string_view url_or_name);
 
-  // Waits until all are ACTIVE under our control (watcher: heard). Returns those that are not.
+  // Waits until every board is ACTIVE and this program controls it. A watcher waits until every
+  // link is active or safe. Returns the boards that are not ready.
   Boards wait_active(Duration timeout = Duration{3000});
   std::vector<BoardHealth> health() const;
   // The newest state of each board, all read at one instant.
@@ -161,28 +163,29 @@ class R4LINK_API Fleet {
   FleetResults send(std::string_view text, Duration timeout = default_timeout);
   FleetResults send(const Boards& boards, std::string_view text,
                     Duration timeout = default_timeout);
-  // Setpoints of several boards; each board confirms its own.
+  // Setpoints of several boards; each board confirms its own setpoints.
   FleetResults send(const std::vector<BoardSetpoints>& setpoints,
                     Duration timeout = default_timeout);
   FleetResults arm(Duration timeout = default_timeout);
   FleetResults arm(const Boards& boards, Duration timeout = default_timeout);
 
-  // Sends E:STOP to all boards in one pass before it waits, and repeats it until each has
-  // confirmed. One frame on each CAN bus stops all boards there, also foreign ones. Does not throw
-  // if boards do not confirm: their results say to cut the power, and the stop is repeated to them
-  // (and their buses) for default_timeout more.
+  // Sends E:STOP to all boards in one pass before it waits, and repeats it until each board has
+  // confirmed it. One frame on each CAN bus stops all boards of the bus, also boards outside the
+  // fleet. If a board does not confirm, no error is thrown: its result advises to cut the power,
+  // and the stop is repeated to this board and its bus for default_timeout more.
   FleetResults stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
-  // Sends once, in one pass of the loop, without confirmation; outcomes in order. For streams.
+  // Sends once, in one pass of the loop, without confirmation, for streams of setpoints. The
+  // results are in the order of `setpoints`.
   std::vector<PostResult> post(const std::vector<BoardSetpoints>& setpoints);
 
-  // Waits for the next event, oldest first; empty if none comes. Keeps the newest 4096.
+  // Waits for the next event, oldest first; empty if none comes. Keeps the newest 4096 events.
   std::optional<FleetEvent> next_event(Duration timeout = Duration{0});
 
   void record(Recording& recording);
 
-  // As Board::watchdog(): without feed() for `period`, all boards go safe.
+  // As Board::watchdog(): if feed() is not called for `period`, all boards go safe.
   void watchdog(Duration period);
   void feed();
 
@@ -192,7 +195,7 @@ class R4LINK_API Fleet {
   std::unique_ptr<Impl> impl_;
 };
 
-// One board of a fleet; the fleet must outlive it. Calls throw as those of Board do.
+// One board of a fleet; the fleet must outlive it. Calls throw as the calls of Board do.
 class R4LINK_API FleetBoard {
  public:
   using Duration = Fleet::Duration;

@@ -3,7 +3,7 @@
 //
 //     <id>:<64 hexadecimal digits>      "1:00112233…", the id 1-9
 //
-// The text is what a key file holds and what the setting `key` takes.
+// A key file and the setting `key` hold this text.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ namespace r4 {
 
 constexpr std::size_t key_size = 32;
 constexpr std::uint8_t max_key_id = 9;
-constexpr int max_keys = 4;  // of a board
+constexpr int max_keys = 4;  // keys of a board
 
 struct Key {
   std::uint8_t id = 0;  // 1-9; 0: no key
@@ -26,7 +26,8 @@ struct Key {
 R4LINK_API bool operator==(const Key& a, const Key& b);
 inline bool operator!=(const Key& a, const Key& b) { return !(a == b); }
 
-// Reads a key. Refusal::format: not as above; ::range: the id is not 1-9. `out`: only if none.
+// Refusal::format: not the form above; ::range: the id is not 1-9. `out` is written only on
+// success.
 R4LINK_API Refusal parse_key(Text text, Key& out);
 // Splits "<id>:<rest>", with the refusals of parse_key().
 R4LINK_API Refusal split_key(Text text, std::uint8_t& id, Text& rest);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A link to a board as the host sees it: its health, the ends of commands, and the newest state.
+// The host's view of a link to a board: its health, the ends of commands, and the newest state.
 #pragma once
 
 #include <bit>
@@ -22,29 +22,29 @@
 
 namespace r4 {
 
-// Time of the host's steady clock, in microseconds since any start.
+// Time of the host's steady clock, in microseconds since an arbitrary start.
 using Time = std::chrono::microseconds;
 
-// The problems of a link, the gravest first. `other_board` does not disturb the link.
+// The problems of a link, the gravest first.
 enum class LinkCause : std::uint8_t {
-  transport_down,  // the transports of all paths are down: unplugged, or switched off
-  two_boards,      // the paths lead to two boards, and no state is accepted
-  watchdog,        // the application watchdog was not fed: no heartbeats or commands are sent
+  transport_down,  // the transports of all paths are down: unplugged or switched off
+  two_boards,      // the paths lead to two boards; no state is accepted
+  watchdog,        // feed() is not called: no heartbeats or commands are sent
   callback,        // a callback of the program does not return: no heartbeats or commands are sent
   foreign_frames,  // another protocol uses the board's command id (CAN)
   busy,            // another host controls the board
-  board_has_no_key,  // this program has a key, and the board needs no signature
-  key_needed,        // the board needs a signature, and this program has no key
-  key_not_taken,     // the board rejects this program's signature, or does not hear it
-  watchers_full,     // the board already streams to as many watchers as it can
+  board_has_no_key,  // this program has a key, but the board needs no signature
+  key_needed,        // the board needs a signature, but this program has no key
+  key_not_taken,     // the board rejects this program's signatures or does not receive them
+  watchers_full,     // the board has no room for another watcher
   not_watchable,     // the board's firmware streams only to the controlling host
-  late_frames,       // the board's flow control comes too late (CAN)
-  other_board,       // a path leads to another board and is not used; the link is up
+  late_frames,       // the board's flow control frames are late (CAN)
+  other_board,       // a path leads to another board and is not used; the link works
 };
-// "transport down", "two boards" …: the names above, with spaces.
+// The enumerator's name with spaces: "transport down", "two boards" …
 R4LINK_API const char* to_text(LinkCause cause);
 
-// A set of causes. A loop over it starts with the gravest.
+// A set of causes. A loop over the set starts with the gravest cause.
 class LinkCauses {
  public:
   struct Iterator {
@@ -89,10 +89,10 @@ class LinkCauses {
 
 // docs/how-to/redundancy.md. A board's only path is never asking or other_board.
 enum class PathState : std::uint8_t {
-  down,         // the transport is down, or could not be opened yet
-  asking,       // the transport is up, and the board's identity is not known yet
-  other_board,  // the path leads to another board: only stops are sent on it
-  silent,       // the board was heard before, but was silent for the timeout
+  down,         // the transport is down or not opened
+  asking,       // the transport is up, but the board's identity is unknown
+  other_board,  // the path leads to another board: only stops and Q:ID are sent
+  silent,       // the board has been silent for the timeout
   carrying,
 };
 // "down", "asking", "other board", "silent", "carrying".
@@ -102,62 +102,64 @@ struct LinkStatus {
   HostLinkState state = HostLinkState::connecting;
   SafeReason reason = SafeReason::none;  // why the board is safe
   LinkCauses causes{};
-  bool in_control = false;    // the board takes our commands: they are sent at once
-  std::uint8_t carrying = 0;  // which paths carry: bit 0 is the first
-  ChipFault chip{};           // for SafeReason::fault: the chip that caused it, if any
+  bool in_control = false;    // the board accepts this host's commands, which are sent at once
+  std::uint8_t carrying = 0;  // the paths that carry: bit 0 is the first
+  ChipFault chip{};           // the cause of SafeReason::fault, if it is a chip
 
-  // The gravest cause.
+  // The gravest cause; none if there is no cause.
   std::optional<LinkCause> cause() const { return causes.first(); }
-  // True if the link cannot begin, because the paths lead to two boards.
+  // True if the link cannot begin because the paths lead to two boards.
   bool cannot_begin() const {
     return state == HostLinkState::connecting && causes.has(LinkCause::two_boards);
   }
-  // True if heartbeats and commands are held back because the program seems to hang.
+  // True if heartbeats and commands are held back because the program may hang.
   bool gated() const { return causes.has_any({LinkCause::watchdog, LinkCause::callback}); }
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
 };
 
-// Whether a program must call arm() before it drives.
+// Whether a program must call arm() before output commands.
 enum class Arming : std::uint8_t {
   required,
   off,  // output commands are sent whenever the link is up
 };
 
 enum class DisarmCause : std::uint8_t {
-  none,     // armed
-  not_yet,  // arm() was not called yet
+  none,     // the program is armed
+  not_yet,  // arm() has not been called
   stop,
   handle,
-  proximity,  // something came nearer than a threshold
+  proximity,  // an ultrasonic sensor measured less than its threshold
   watchdog,   // a task of the firmware missed its deadline
-  fault,      // the board found a fault of its own
-  link,       // the link was lost, and the board did not restore its outputs
+  fault,      // a chip does not answer, or the firmware found a fault
+  link,       // the link was lost, and the board did not restore the outputs
   restart,
-  supply,  // relay 1, the motor supply, was opened
+  supply,  // relay 1, the motor supply, opened
   sleep,   // this computer slept for longer than the board's timeout
-  // arm() does not clear these, which may be older than the program; Command::clear() does.
+  // Causes that may be older than the program: arm() does not clear them, Command::clear() does.
   earlier_stop,
   earlier_watchdog,
-  earlier_fault,  // or one with which the board began
+  earlier_fault,  // or a fault since the board's start
 };
 // "stop", "not yet", "earlier stop" …
 R4LINK_API const char* to_text(DisarmCause cause);
-// True if arm() does not clear the cause.
+// True if only Command::clear() clears the cause.
 constexpr bool is_earlier(DisarmCause cause) { return cause >= DisarmCause::earlier_stop; }
 
 struct CommandResult {
   Outcome outcome = Outcome::timed_out;
   Refusal code = Refusal::none;              // for refused
-  Time elapsed{0};                           // from the call to its end
+  Time elapsed{0};                           // from the call to the end of the command
   DisarmCause disarmed = DisarmCause::none;  // for not_armed
-  // For a group: number of the command that was refused or, sent one by one, under way, from 1; 0:
-  // no particular one. `executed`: how many commands before it were executed.
+  // Of a group, `at` is the number of the refused command, from 1; 0: no particular command. If the
+  // commands are sent one by one, `at` is the command that was under way at the end. `executed`:
+  // the number of commands before `at` that were executed.
   std::uint8_t at = 0;
   std::uint8_t executed = 0;
-  // Packet number of the command, for example in I2CX of the state. 0: not sent.
+  // Packet number of the command, as in I2CX of the state. 0: not sent.
   std::uint32_t pnum = 0;
-  // `step`: of a Device that was not set up, the failed step, from 1. `transfer`: the answer to
-  // async_transfer() or to that step. A transfer that timed out with `executed` 1 was begun.
+  // `step`: the failed step of a Device's set-up, from 1. `transfer`: the answer to
+  // async_transfer() or to the failed step. If `executed` is 1, a transfer that timed out was
+  // begun.
   std::uint16_t step = 0;
   I2cAnswer transfer{};
 };
@@ -169,9 +171,9 @@ class PostResult {
  public:
   enum Value : std::uint8_t {
     sent,
-    not_armed,  // an output command, and the program is not armed: call arm()
-    no_link,    // the link is not up, or the board does not take our commands yet
-    // too many commands wait, or a group waits or is sent command by command: try again later
+    not_armed,  // an output command while the program is not armed: call arm()
+    no_link,    // the link is not up, or the board does not accept this host's commands
+    // too many commands wait, or a group waits or is sent one by one: try again later
     queue_full,
   };
   PostResult(Value value) : value_(value) {}        // NOLINT(google-explicit-constructor)
@@ -187,39 +189,39 @@ class PostResult {
 R4LINK_API const char* to_text(PostResult result);
 
 struct RefusedPost {
-  Command command;               // without its texts
-  Refusal code = Refusal::none;  // the board's refusal; none if it was not sent: see `why`
+  Command command;               // without texts
+  Refusal code = Refusal::none;  // the board's refusal; none if not sent: see `why`
   PostResult why = PostResult::sent;
-  // Of a group no command was executed. `command` is the one that the board could not execute, the
-  // `at`th from 1; at 0: no particular one, and `command` is the first.
+  // Of a refused group, no command was executed. `at`: the number of `command` in the group, from
+  // 1. If `at` is 0, the refusal concerns the whole group, and `command` is its first command.
   std::uint8_t at = 0;
   std::uint8_t group = 1;  // number of commands in the group
 };
 
-// A field that a datagram lacks keeps its value, until the board restarts. The values in `present`
-// are as old as age(), the others older. Heartbeats update `safe` too.
+// A field that a datagram lacks keeps its value until the board restarts. Values in `present` are
+// as old as age(), other values are older. Heartbeats also update `safe`.
 struct ReceivedState : State {
   using Clock = std::chrono::steady_clock;
 
-  // Reported since the board started. Any other field reads 0.
+  // The fields that the board has reported since it started. Other fields read 0.
   FieldSet reported;
-  // When its newest datagram arrived.
+  // The arrival of the newest datagram.
   Clock::time_point received = never;
   // Clock::time_point::min() before the first state since the board started.
   static constexpr Clock::time_point never = Clock::time_point::min();
-  // When the board's clock began to show t_ms, estimated on this computer's clock from arrival
-  // times and answers. The board reads its inputs within a millisecond after that.
+  // The instant when the board's clock began to show t_ms, on this computer's clock, estimated from
+  // arrival times and answers. The board reads its inputs within a millisecond after this instant.
   Clock::time_point sampled = never;
   // Largest error of `sampled`. `unknown` before the first answer, and for a watcher on CAN, which
-  // sends no questions: then the sample was not later than `sampled`.
+  // sends no questions. If it is unknown, the sample was not later than `sampled`.
   Clock::duration sampled_error = unknown;
   static constexpr Clock::duration unknown = Clock::duration::max();
   bool any() const { return received != never; }
-  // Time since the arrival; Clock::duration::max() if none has arrived.
+  // Time since the arrival; Clock::duration::max() before the first state.
   Clock::duration age(Clock::time_point now = Clock::now()) const {
     return any() ? now - received : Clock::duration::max();
   }
-  // `sampled` by the calendar's clock as it is set now. Only if any().
+  // `sampled` by the present setting of the system clock. Requires any().
   std::chrono::system_clock::time_point sampled_at_wall_time() const {
     return std::chrono::system_clock::now() +
            std::chrono::round<std::chrono::system_clock::duration>(sampled - Clock::now());
@@ -230,7 +232,7 @@ struct BoardIdentity {
   std::string firmware;
   std::string board_id;
   std::string capabilities;             // words joined by '+': "udp+serial"
-  std::string name;                     // set by its owner; may be empty
+  std::string name;                     // set by the owner; may be empty
   std::optional<BoardWiring> wiring{};  // after Command::ask_wiring()
 };
 
@@ -241,7 +243,7 @@ struct Statistics {
   std::uint64_t damaged = 0;  // bad checksum, syntax or length
   std::uint64_t copies = 0;   // duplicates, on the same or another path; not counted in `received`
   // lost: not received on any path. duplicate: received before. restarts: of the board, by its
-  // clock; a sleep of this computer that is longer than the board's timeout counts as one.
+  // clock. A sleep of this computer for longer than the board's timeout counts as a restart.
   PacketCounters packets;
   double state_rate_hz = 0;  // over the last second
   // Times in microseconds; 0 until measured
@@ -250,7 +252,7 @@ struct Statistics {
   double round_trip_mean_us = 0;
   double jitter_us = 0;     // interarrival jitter of the states (RFC 3550 6.4.1)
   double state_age_us = 0;  // since the newest state arrived
-  // Parts per million by which the board's clock is slower than this computer's; both 0 until known
+  // Parts per million by which the board's clock is slower than this computer's; 0 until known
   double clock_drift_ppm = 0;
   double clock_drift_error_ppm = 0;
   // Datagrams from this host
@@ -268,14 +270,14 @@ struct Statistics {
 };
 
 struct PathStatus {
-  std::string name;  // of its transport, for people
+  std::string name;  // the transport's name, for people
   PathState state = PathState::down;
-  bool busy = false;         // that board reports that another host controls it
+  bool busy = false;         // the board on this path reports that another host controls it
   std::string board_id;      // of the board that answered last on this path
-  PacketCounters packets;    // of the board's datagrams on this path; restarts: of their numbers
-  std::uint64_t copies = 0;  // of these, duplicates: received before on this or another path
-  double round_trip_us = 0;  // us, of the newest question and answer; 0: none yet
-  double age_us = 0;         // us since the newest datagram; 0: none yet
+  PacketCounters packets;    // counts of this path; restarts: of its packet numbers
+  std::uint64_t copies = 0;  // datagrams received before on this or another path
+  double round_trip_us = 0;  // us, of the newest question and answer; 0: none
+  double age_us = 0;         // us since the newest datagram; 0: none
   // Lost share of the board's datagrams, 0-1.
   double loss() const {
     const double all = static_cast<double>(packets.received) + packets.lost;
@@ -287,15 +289,15 @@ struct PathStatus {
 inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must stop now";
 
 // The state of the link and the fix: "another host controls the board", "stop it, or …". `name`:
-// the board's. Of kind refused, as all explain() below.
+// the board's name. All explain() return a problem of kind refused.
 R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 
-// Which path leads to another board, and the fix.
+// The paths that lead to two boards, and the fix.
 R4LINK_API Problem explain(const std::vector<PathStatus>& paths);
 
 R4LINK_API Problem explain(LinkCause cause);
 
-// Why the session is not armed, and the fix. Not for none. `what`: the request that failed.
+// Why the session is not armed, and the fix. `cause`: not none. `what`: the request that failed.
 R4LINK_API Problem explain(std::string_view what, DisarmCause cause);
 
 // Why a command or a group was not confirmed. `link`: the link at that time.
@@ -303,7 +305,7 @@ R4LINK_API Problem explain(const Command& command, const CommandResult& result,
                            const LinkStatus& link);
 R4LINK_API Problem explain(const Setpoints& group, const CommandResult& result,
                            const LinkStatus& link);
-// For a request that is not a command, by its name: "arm()".
+// `request`: the name of a request that is not a command, "arm()".
 R4LINK_API Problem explain(std::string_view request, const CommandResult& result,
                            const LinkStatus& link);
 

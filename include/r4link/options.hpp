@@ -14,7 +14,7 @@
 
 namespace r4 {
 
-// A program's role at its board; take_control() and release_control() change it.
+// take_control() and release_control() change the role.
 enum class BoardRole : std::uint8_t {
   control,  // sends heartbeats, and commands when no other host controls the board
   watch,    // reads states without control; may only stop the board
@@ -32,22 +32,23 @@ constexpr const char* to_text(BoardRole role) {
 
 struct SessionOptions {
   // States per second for a watcher, 1-1000; limited by the board's `rate`. On a CAN bus, a watcher
-  // also gets states that are sent for other programs.
+  // also receives states that are sent to other programs.
   int watch_rate_hz = 100;
   LinkTiming timing;
-  // Whether a program must call arm() before it drives, and after most safe states (Board::arm()).
+  // Whether output commands need arm(), also after most safe states (Board::arm()).
   Arming arming = Arming::required;
-  // The state fields to request, as F; SAFE and CMD, and RELAYS for arming, are added to any F.
-  // Empty: F is neither sent nor changed. "DEFAULT" for a watcher: the controlling host's.
+  // The state fields to request, as in F. SAFE and CMD, and RELAYS for arming, are added. Empty: F
+  // is neither sent nor changed. "DEFAULT" of a watcher: the fields of the controlling host.
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
   // How long a stop is repeated after it is confirmed.
   std::chrono::milliseconds stop_linger{200};
-  // Period of Q:ID; 0: never. Then the round trip and ReceivedState::sampled_error stay unknown,
-  // and on one path identity() too, unless the program calls identify() or sends a group.
+  // Period of Q:ID; 0: never. Without Q:ID the round trip and ReceivedState::sampled_error stay
+  // unknown. With one path, identity() stays empty until the program calls identify() or sends a
+  // group.
   std::chrono::milliseconds identify_interval{1000};
-  // Each host needs a separate id: with a shared id the slower host looks like a replay.
+  // Each host needs its own key id: with a shared id, the slower host looks like a replay.
   std::optional<Key> key;
   // Start of the session's clock, us since 1970. A restarted host must continue above used values.
   Time clock_start{0};
@@ -56,11 +57,11 @@ struct SessionOptions {
 struct BoardOptions {
   BoardRole role = BoardRole::control;
   SessionOptions session;
-  // Board only: after this time in the callbacks of one event the heartbeats stop and the board
-  // goes safe, as nothing supervises the robot. They resume afterwards. At most one hour; 0: off.
+  // Board only: if the callbacks of one event take longer, the heartbeats stop and the board goes
+  // safe. When the callbacks end, the heartbeats resume. At most one hour; 0: off.
   std::chrono::milliseconds callback_limit{500};
-  // Board only: each waiting call calls it on its own thread every 50 ms. An exception from it ends
-  // the call like a timeout: an unsent command is never sent, except a stop.
+  // Board only: a waiting call calls on_wait() every 50 ms, on the thread of the call. An exception
+  // from on_wait() ends the call like a timeout: an unsent command is never sent, except a stop.
   std::function<void()> on_wait;
 };
 
@@ -70,9 +71,8 @@ struct BoardOptions {
 //     options.session.key = r4::load_key("/home/me/.r4-key");
 //     r4::Board board("udp://192.168.0.125", options);
 //
-// Throws Error: open if it cannot be read, permission if users other than its owner may read or
-// write it, data if it holds no key. If root owns the file, its group may read it, as for a
-// service.
+// Throws Error: open if the file cannot be read, permission if users other than its owner may read
+// or write it, data if it holds no key. If root owns the file, the file's group may read it.
 R4LINK_API Key load_key(const std::string& path);
 
 }  // namespace r4

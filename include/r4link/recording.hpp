@@ -8,12 +8,12 @@
 //     left.record(recording);
 //     right.record(recording);
 //
-// It holds datagrams in both directions, damaged ones too, with the host's time, and events of
-// transports and links. A thread writes to the disk four times a second: a crash costs at most the
-// last second. The link never waits: 4 MiB are buffered for a slow disk, and further losses are
-// counted. If the disk is full, the recording ends, on_event() reports it (kind open), and the link
-// continues. If another program moves, removes or truncates the file, a new one is started under
-// its name, and on_event() reports that.
+// It holds datagrams in both directions, also damaged datagrams, with the host's time, and events
+// of transports and links. A thread writes to the disk four times a second: a crash costs at most
+// the last second. The link never waits for the disk: 4 MiB are buffered, and lost records are
+// counted. If the disk is full, the recording ends, on_event() reports that (kind open), and the
+// link continues. If another program moves, removes or truncates the file, the recording continues
+// in a new file of that name, and on_event() reports that.
 #pragma once
 
 #include <chrono>
@@ -32,12 +32,12 @@ namespace r4 {
 class Recorder;
 
 struct RecordingOptions {
-  // A new file after this size or time, whichever comes first; 0: no limit. With any limit,
+  // Starts a new file after this size or time, whichever comes first; 0: no limit. With any limit,
   // drive.r4log becomes drive-00001.r4log, drive-00002.r4log …, each complete in itself.
   std::uint64_t rotate_bytes = 0;
   std::chrono::seconds rotate_after{0};
-  // Total bytes to keep: the oldest of these files are removed, also those of earlier runs with
-  // that name. At least 1 MiB and four times rotate_bytes; 0: all are kept.
+  // Total bytes to keep: the oldest of the numbered files are removed, also files of earlier runs.
+  // At least 1 MiB and four times rotate_bytes; 0: all files are kept.
   std::uint64_t keep_bytes = 0;
 };
 
@@ -54,13 +54,13 @@ class R4LINK_API Recording {
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
-  // Writes the buffer; waits for the disk. Ignores later datagrams. Any thread; idempotent.
+  // Writes the buffer and waits for the disk. Later datagrams are ignored. Any thread; idempotent.
   void close();
 
-  // Why the recording ended early; empty: no problem. Kind `data`: it continues, but the file was
-  // removed or truncated, and its content is lost.
+  // Why the recording ended early; empty: no problem. Kind `data`: the recording continues, but the
+  // file was removed or truncated, and its content is lost.
   std::optional<Problem> problem() const;
-  // Datagrams and events so far; those that were lost because the disk was too slow.
+  // Datagrams and events so far: in the recording, and lost because the disk was too slow.
   std::uint64_t records() const;
   std::uint64_t dropped() const;
 

@@ -4,8 +4,8 @@
 //     board.send({r4::Command::osmc(1, r4::Duty(0.1)), r4::Command::osmc(2, r4::Duty(0.1)),
 //                 r4::Command::servo(3, r4::Microseconds(1500))});
 //
-// The effect is that of the commands one after the other, in the order of add(), with nothing in
-// between: closing relay 1 after a motor's command cancels that command (docs/reference/safety.md).
+// The commands take effect in the order of add(), without other commands in between. Closing relay
+// 1 after a motor's command cancels the motor's command (docs/reference/safety.md).
 #pragma once
 
 #include <array>

@@ -2,13 +2,13 @@
 // The world around a simulated board in this program, for tests of control programs:
 //
 //     r4::sim::SimulatedRobot robot;
-//     r4::Board board(robot.url());              // or what your program does with a URL
+//     r4::Board board(robot.url());              // or your program with this URL
 //     …
 //     robot.happen("handle released");           // a line of a scenario, without its time
-//     robot.look().pins.osmc[0].pwm              // what the chips do, whatever the state says
+//     robot.look().pins.osmc[0].pwm              // the chip's output, independent of the state
 //
-// Each time the URL is opened, the board is switched on anew on the bench. Then the events that
-// were requested while it was closed happen. Thread-safe, also in callbacks of the board.
+// Each time the URL is opened, the board is switched on anew on the bench. Then events that were
+// requested before the opening happen. Thread-safe, also in callbacks of the board.
 #pragma once
 
 #include <cstdint>
@@ -26,22 +26,22 @@ namespace r4::sim {
 class R4LINK_API SimulatedRobot {
  public:
   SimulatedRobot();
-  // With a robot model in place of the bench vehicle. It is called on the board's thread, once a
-  // simulated millisecond, and must outlive every link.
+  // With a robot model in place of the bench vehicle. The board's thread calls the model once a
+  // simulated millisecond. The model must outlive every link.
   explicit SimulatedRobot(RobotModel& robot);
   ~SimulatedRobot();
   SimulatedRobot(const SimulatedRobot&) = delete;
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
-  // "sim:?robot=1": the board in this world, for one link at a time while this object lives.
+  // "sim:?robot=1": the board in this world, for one link at a time while this object exists.
   const std::string& url() const;
 
-  // Makes an event happen, "us 1 15" (docs/how-to/simulation.md lists all): soon, if the board is
-  // open, perhaps after the return. Throws Error{data} for an unknown event.
+  // Makes an event happen, "us 1 15" (docs/how-to/simulation.md lists all): if the board is open,
+  // soon, perhaps after the return. Throws Error{data} for an unknown event.
   void happen(std::string_view words);
 
   struct Look {
-    bool open = false;  // a link to the board is open; if not, these are the last values
+    bool open = false;  // a link to the board is open; if false, the values below are outdated
     Pins pins;
     bool motors_have_supply = false;
     bool handle_held = true;
@@ -49,7 +49,7 @@ class R4LINK_API SimulatedRobot {
     std::int32_t stepper[stepper_channels] = {};   // steps of the motors since power-on
     std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
   };
-  // Not older than 10 ms.
+  // At most 10 ms old.
   Look look() const;
 
   class R4LINK_PRIVATE World;
@@ -60,12 +60,12 @@ class R4LINK_API SimulatedRobot {
   std::string url_;
 };
 
-// A board behind a bad link, on any transport:
+// A board over a bad link, on any transport:
 //
 //     r4::Board board(r4::sim::with_link(robot.url(), "loss=5%,delay=20ms±10,seed=7"));
 //
-// docs/how-to/simulation.md lists the words; others throw Error{usage}. The same seed does the same
-// to the same datagrams at the same times. A watcher needs its own URL: `?listen=0` on UDP.
+// docs/how-to/simulation.md lists the words; other words throw Error{usage}. A seed has the same
+// effect on the same datagrams at the same times. A watcher needs its own URL: `?listen=0` on UDP.
 R4LINK_API CarrierMaker with_link(std::string_view url, std::string_view link);
 
 }  // namespace r4::sim

@@ -13,7 +13,7 @@ namespace r4 {
 
 class Datagram;
 
-// In wire order: the paper's ten first; from I2C1 on, devices (docs/how-to/devices.md) and faults.
+// In wire order: first the paper's ten; from I2C1 on, devices (docs/how-to/devices.md) and faults.
 enum class StateField : std::uint8_t {
 #define R4_STATE_FIELD(field, ...) field,
 #include "tables/board.def"
@@ -21,7 +21,7 @@ enum class StateField : std::uint8_t {
 };
 constexpr int state_field_count = static_cast<int>(StateField::count);
 
-// A set of state fields: the selection to send, or the fields of a datagram.
+// A set of state fields, such as a selection to send or the fields of a datagram.
 class R4LINK_API FieldSet {
  public:
   constexpr FieldSet() = default;
@@ -58,7 +58,7 @@ class R4LINK_API FieldSet {
     }
     const std::uint32_t* words_;
     int word_;
-    std::uint32_t bits_;  // of that word, the bits that are still to come
+    std::uint32_t bits_;  // the bits of words_[word_] that have not been visited
   };
   Iterator begin() const { return Iterator(words_, 0); }
   Iterator end() const { return Iterator(words_, word_count); }
@@ -72,7 +72,7 @@ class R4LINK_API FieldSet {
   friend bool operator!=(const FieldSet& a, const FieldSet& b) { return !(a == b); }
 
   static FieldSet paper_default();  // AIN24 … SERVO1POS
-  // Without I2C1 to GPIO (the user's devices) and FAULT (sent while there is a fault).
+  // All fields except I2C1 to GPIO (the user's devices) and FAULT (sent while there is a fault).
   static FieldSet all();
 
  private:
@@ -98,13 +98,13 @@ struct ChannelValues {
   std::int32_t stepper_steps[stepper_channels] = {};
   std::int32_t encoder_counts[encoder_channels] = {};
   std::int32_t encoder_hz[encoder_channels] = {};            // counts per second
-  std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
+  std::int32_t encoder_index_counts[encoder_channels] = {};  // count when the index line rose last
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
   I2cReading i2c[i2c_slots];
   UartBytes uart[uart_channels];
 };
 
-// On a host, `present` has the fields of the datagram; other fields keep earlier values.
+// On a host, `present` has the fields of this state's datagram; other fields keep earlier values.
 struct State {
   FieldSet present;
   std::uint32_t pnum = 0;
@@ -127,12 +127,12 @@ struct State {
 
   // True if the dead-man's handle is held, or if the board has none.
   bool handle_held() const { return handle != Handle::released; }
-  // By channel, from 1. A channel that does not exist reads 0.
+  // For the functions below, channels count from 1. A channel that does not exist reads 0.
   double volts(Analog input) const {
     const int i = static_cast<int>(input);
     return i < analog_channels ? raw.analog_cv[i] / 100.0 : 0.0;
   }
-  // dhb12(), osmc(), servo_us(), bldc(), dac_mv(): what the board drives: off in the safe state.
+  // osmc(), dhb12(), servo_us(), bldc(), dac_mv(): the outputs as driven, off in the safe state.
 #define R4_OUTPUT(kind, Value, member, channels, ...) \
   Value member(int channel) const { return reading(raw.member, channel); }
 #include "tables/board.def"
@@ -161,10 +161,10 @@ struct State {
 
 // The name on the wire, "AIN24".
 R4LINK_API Text name_of(StateField field);
-// The field of that name; StateField::count if there is none. Constant time.
+// The field with this name; StateField::count if there is none. Constant time.
 R4LINK_API StateField state_field(Text name);
 
-// Reads `F`: "DEFAULT", "ALL" or names of fields, with commas. Refusal::unknown otherwise.
+// Reads `F`: "DEFAULT", "ALL" or names, with commas. Refusal::unknown for another word.
 R4LINK_API Refusal parse_fields(Text list, FieldSet& out);
 
 // Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Ignores

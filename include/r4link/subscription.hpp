@@ -13,11 +13,11 @@ class Subscriber;
 // The handle of one callback. Destroying it does not end the callback.
 class R4LINK_API Subscription {
  public:
-  Subscription() = default;  // an ended one
+  Subscription() = default;  // an ended subscription
   explicit Subscription(const std::shared_ptr<Subscriber>& subscriber) : subscriber_(subscriber) {}
 
-  // Ends the callback: after the return it does not run, except if it called cancel() itself.
-  // Idempotent; any thread; also after the board is destroyed.
+  // Ends the callback. After the return the callback does not run, unless it called cancel()
+  // itself. Idempotent; any thread; also after the board is destroyed.
   void cancel();
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A view of characters: string_view for the portable core, which is C++14. It owns nothing, has no
-// NUL at its end and may hold any byte. Valid as long as the buffer.
+// A view of characters: a string_view for the portable core, which is C++14. A Text owns nothing,
+// has no NUL at its end and may hold any byte. Valid as long as the buffer.
 #pragma once
 
 #include <cstddef>
@@ -40,7 +40,7 @@ class Text {
   friend bool operator!=(Text a, Text b) { return !(a == b); }
 
  private:
-  // memcmp() of short texts without a call: compares both ends, which may overlap.
+  // Compares short texts without a call of memcmp(): compares both ends, which may overlap.
   template <class Word>
   static bool same_ends(const char* a, const char* b, std::size_t size) {
     Word words[4];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Listens to a CAN interface: every frame goes to a CanSurvey, and nothing is ever sent. It reports
-// the events of the interface as a carrier does. With r4link::asio only.
+// Listens to a CAN interface: every frame goes to a CanSurvey, and nothing is sent. A CanListener
+// reports the events of the interface as a carrier does. With r4link::asio only.
 //
 //     asio::io_context io;
 //     r4::CanListener bus(io, "can0", {1000000, 0});
@@ -21,7 +21,7 @@ namespace r4 {
 
 class CanListener {
  public:
-  // `rate` is for the survey's sums. Throws Error, as a carrier's open() does.
+  // `rate` is for the survey's sums. Throws Error as a carrier's open() does.
   CanListener(asio::io_context& io, const std::string& interface, CanBitRate rate);
   ~CanListener();
   CanListener(const CanListener&) = delete;
@@ -31,11 +31,11 @@ class CanListener {
   const CanSurvey& survey() const;
   // The clock of the survey's frames, in microseconds; wraps.
   static std::uint32_t now_us();
-  // True if CAN FD frames came that switch their bit rate: the survey's sums need rate.data.
+  // True if CAN FD frames with a switched bit rate came: the survey's sums need rate.data.
   bool heard_rate_switch() const;
-  // True while the interface is down, or a warning stands.
+  // True while the interface is down or a warning applies.
   bool in_trouble() const;
-  // An event that is true already is reported at once.
+  // An event that already applies is reported at once.
   void on_event(std::function<void(const CarrierEvent&)> callback);
 
  private:

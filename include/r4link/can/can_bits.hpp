@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The length of a frame on a CAN bus, to the bit (ISO 11898-1:2015, clauses 10.4 and 10.5).
+// The exact length of a frame on a CAN bus in bits (ISO 11898-1:2015, clauses 10.4 and 10.5).
 //
 //              SOF  id and control  data  CRC   delimiter  ACK  EOF  intermission
 //     classic  |<------- stuffed ----------->|
@@ -10,8 +10,8 @@
 // has a stuff bit at its start and after every fourth bit, and a count of the other stuff bits: its
 // length is fixed. A classic CRC is stuffed, so it is computed. An FD frame switches its bit rate
 // at the sample points of BRS and of the CRC delimiter. Here BRS counts as nominal and the
-// delimiter as data: exact in the sum if both sample points are equal parts of a bit. ESI is that
-// of an error-active sender. Every count includes the 3 bits of intermission. Linear time.
+// delimiter as data: the sum is exact if both sample points are equal parts of a bit. ESI counts as
+// sent by an error-active sender. Every count includes the 3 bits of intermission. Linear time.
 #pragma once
 
 #include <cstdint>
@@ -25,23 +25,23 @@ constexpr std::uint32_t can_intermission_bits = 3;
 constexpr std::uint32_t can_acknowledge_delimiter_bits = 1;
 constexpr std::uint32_t can_end_of_frame_bits = 7;
 
-// Bits of a frame by bit rate. A frame that does not switch has only nominal bits.
+// Bits of a frame by bit rate. A frame that does not switch its rate has only nominal bits.
 struct CanBits {
   std::uint32_t nominal;
   std::uint32_t data;
 };
 constexpr std::uint32_t total(CanBits bits) { return bits.nominal + bits.data; }
 
-// Bits per second. FD frames switch to the data rate; with 0 they do not switch.
+// Bits per second. FD frames switch to the data rate; if it is 0, they do not switch.
 struct CanBitRate {
   std::uint32_t nominal;  // not 0
   std::uint32_t data;
 };
 
-// The bits of this frame. Its size must be valid (has_valid_size()).
+// The frame's size must be valid (has_valid_size()).
 R4LINK_API CanBits can_bits(const CanFrame& frame, bool switches_rate = true);
 
-// The most bits of any frame of that format, id length and size. `size` must be valid.
+// The most bits of any frame with this format, id length and size. `size` must be valid.
 R4LINK_API CanBits worst_can_bits(std::uint8_t size, bool fd, bool extended,
                                   bool switches_rate = true);
 
@@ -51,7 +51,7 @@ R4LINK_API CanBits least_can_bits(std::uint8_t size, bool fd, bool extended,
 
 // The time of the bits in nanoseconds, rounded up.
 R4LINK_API std::uint64_t time_ns(CanBits bits, CanBitRate rate);
-// The time that the frame occupies the bus, with its intermission.
+// The time for which the frame occupies the bus, including the intermission.
 R4LINK_API std::uint64_t time_ns(const CanFrame& frame, CanBitRate rate);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One frame on a CAN bus, classic or FD (ISO 11898-1), as the framings and carriers pass it on.
+// One frame on a CAN bus, classic or FD (ISO 11898-1).
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,10 @@
 namespace r4 {
 
 constexpr std::uint8_t max_classic_size = 8;  // bytes of data in a classic frame
-constexpr std::uint8_t max_fd_size = 64;      // and in an FD frame
-constexpr std::uint32_t max_can_id = 0x7FF;   // 11 bits; lower wins the bus
+constexpr std::uint8_t max_fd_size = 64;      // bytes of data in an FD frame
+constexpr std::uint32_t max_can_id = 0x7FF;   // 11 bits; the lower id wins the bus
 
-// Without initialisers, so that making one costs nothing; `CanFrame frame{}` is all zero.
+// Without initialisers, so that a CanFrame costs no time; `CanFrame frame{}` is all zero.
 struct CanFrame {
   std::uint32_t id;   // 11 bits, or 29 if `extended`
   std::uint8_t size;  // bytes of data: 0–8, in an FD frame also 12, 16, 20, 24, 32, 48, 64
@@ -32,7 +32,6 @@ constexpr std::uint8_t can_frame_size(std::uint32_t size) {
                       : 64;
 }
 
-// True if the size is valid in the frame's format.
 constexpr bool has_valid_size(const CanFrame& frame) {
   return frame.size <= max_classic_size || (frame.fd && can_frame_size(frame.size) == frame.size);
 }

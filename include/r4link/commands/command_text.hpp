@@ -5,7 +5,7 @@
 //     r4::to_text(command);   // "O:358,1,1"
 //     r4::describe(command);  // "OSMC 1 forward, duty 0.087"
 //
-// A secret in a command (a key, a password): to_text() writes it, shown() and describe() do not.
+// to_text() writes the secret of a command (a key, a password); shown() and describe() do not.
 #pragma once
 
 #include <span>
@@ -20,7 +20,7 @@
 
 namespace r4 {
 
-// A command that owns its texts. A `Command` holds views, which its caller's texts may not outlive.
+// A command that owns its texts. The texts of a `Command` are views.
 class OwnCommand {
  public:
   OwnCommand() = default;
@@ -29,7 +29,7 @@ class OwnCommand {
         text_(command.text.data(), command.text.size()),
         text2_(command.text2.data(), command.text2.size()) {}
 
-  // The command's texts are views of this object.
+  // The texts of the result are views of this object.
   operator Command() const& {  // NOLINT(google-explicit-constructor)
     Command command = command_;
     command.text = text_;
@@ -43,12 +43,12 @@ class OwnCommand {
   std::string text_, text2_;
 };
 
-// Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} that names the fault.
+// Parses "O:358,1,1", with or without a final ';'. Throws Error{usage} with the fault.
 R4LINK_API OwnCommand parse_command_text(std::string_view text);
 
 using CommandOrGroup = std::variant<OwnCommand, Setpoints>;
-// Parses "O:358,1,1", or a group: "O:358,1,1;O:358,1,2". Throws Error{usage} that names the command
-// that is wrong, or that cannot be in a group.
+// Parses "O:358,1,1", or a group, "O:358,1,1;O:358,1,2". Throws Error{usage} with the faulty
+// command.
 R4LINK_API CommandOrGroup parse_text(std::string_view text);
 
 // "O:358,1,1". Empty if a text of the command has bytes that a datagram cannot hold.
@@ -64,19 +64,19 @@ R4LINK_API std::string shown(std::string_view text);
 // The command in words, with units and without a secret: "servo 3 at 1500 us", "relay 1 on".
 R4LINK_API std::string describe(const Command& command);
 
-// Throws Error{usage} unless every path of `url` is a board's own cable. Elsewhere others would see
-// the secret, and boards do not accept it. `secret`: its name.
+// Throws Error{usage} unless every path of `url` is a board's own cable. On other transports, other
+// programs would see the secret, and boards refuse it. `secret`: the name of the secret.
 R4LINK_API void require_cable(std::string_view url, std::string_view secret);
-// The same if the command holds a secret. The boards call it before they send.
+// The same, if the command holds a secret. Board and AsyncBoard call it before they send.
 R4LINK_API void require_cable(std::string_view url, const Command& command);
 
 // The meaning of a board's refusal: "no such channel".
 R4LINK_API std::string_view meaning_of(Refusal refusal);
 
-// The name of the kind: "OSMC", "servo".
+// "OSMC", "servo".
 R4LINK_API std::string_view name_of(CommandKind kind);
 
-// One kind of command, for help and for the fix in an error.
+// The help for a kind of command, also for the fix in an error.
 struct CommandHelp {
   CommandKind kind = CommandKind::heartbeat;
   std::string form;          // "O:pwm,dir,ch"

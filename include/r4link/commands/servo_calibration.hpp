@@ -6,9 +6,9 @@
 //     board.servo(3).calibrate(arm);
 //     board.servo(3).set(r4::Degrees(30));                           // S:1833,3
 //     r4::Command::servo(3, arm.pulse(r4::Degrees(30)));             // the same, in a group
-//     const auto angle = arm.degrees(board.state().servo_us(3));     // none while the servo is off
+//     const auto angle = arm.degrees(board.state().servo_us(3));     // empty if the servo is off
 //
-// A calibration belongs to the program. It is not sent to the board, which knows pulses only.
+// The calibration is not sent to the board, whose commands have only pulses.
 #pragma once
 
 #include <limits>
@@ -36,22 +36,22 @@ struct Degrees {
   }
 };
 
-// A straight line between the two ends of the servo's travel.
+// Linear between the two ends of the servo's travel.
 class R4LINK_API ServoCalibration {
  public:
   struct End {
     Microseconds pulse;  // 1-2500
     Degrees angle;
   };
-  // The ends in either order; the longer pulse may be the smaller angle. Throws Error{usage} for a
-  // pulse out of range, and unless both the pulses and the angles differ.
+  // The ends may be in either order, and the longer pulse may have the smaller angle. Throws
+  // Error{usage} for a pulse out of range, and for equal pulses or equal angles.
   ServoCalibration(End one, End other);
 
-  // True if the nearest whole microsecond is not beyond an end.
+  // True if the nearest whole microsecond is between the ends.
   bool is_in_range(Degrees angle) const;
-  // The nearest whole microsecond. Throws Error{usage} for an angle out of range.
+  // Rounded to the nearest whole microsecond. Throws Error{usage} for an angle out of range.
   Microseconds pulse(Degrees angle) const;
-  // The angle of a pulse, also of a pulse beyond an end. None for 0: the servo is off.
+  // The angle of a pulse, also beyond the ends. Empty for 0, because the servo is off.
   std::optional<Degrees> degrees(int pulse_us) const;
 
   const End& one() const { return one_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board as a commissioning needs it. BoardOnLink is an r4::Board; tests have a simulated one in
-// virtual time. Calls that wait throw Error.
+// The interface of a board for a commissioning. BoardOnLink uses an r4::Board; tests use a
+// simulated board in virtual time. Calls that wait throw Error.
 #pragma once
 
 #include <chrono>
@@ -22,28 +22,27 @@ class R4LINK_API BoardUnderTest {
  public:
   using Duration = std::chrono::milliseconds;
 
-  virtual void wait_heard() = 0;  // until the board is heard, safe or active
-  // The next state, in order, also of those that came while the caller was away (at least the last
-  // ten seconds). Empty: none came in time.
+  virtual void wait_heard() = 0;  // until the link is active or safe
+  // The next state in order, of at least the last ten seconds. Empty if no state comes in time.
   virtual std::optional<ReceivedState> next_state(Duration timeout) = 0;
-  virtual void forget_states() = 0;  // those that came so far
+  virtual void forget_states() = 0;  // drops the states that have come
   virtual LinkStatus link() = 0;
 
   virtual BoardIdentity identify() = 0;
   virtual BoardWiring wiring() = 0;
   virtual void give_wiring(const Wiring& wiring) = 0;
-  virtual std::vector<std::uint8_t> scan() = 0;  // addresses that answer on the user's I2C bus
+  virtual std::vector<std::uint8_t> scan() = 0;  // the addresses that answer on the user's I2C bus
 
   // Throws if the board does not confirm it within `timeout`.
   virtual void send(const Command& command, Duration timeout) = 0;
   virtual void arm() = 0;  // closes relay 1
   virtual void stop() = 0;
-  // While supervised, the board goes safe if next_state() is not called for half a second.
+  // While supervised, the board goes safe if next_state() is not called for 0.5 s.
   virtual void supervise(bool supervised) = 0;
-  // While silent, no heartbeats and no commands but stops are sent.
+  // While silent, only stops are sent, and no heartbeats.
   virtual void be_silent(bool silent) = 0;
 
-  // The transports that lead to the board; the first is that of all other calls.
+  // The transports that lead to the board. Functions without an argument `transport` use the first.
   virtual std::vector<std::string> transports() = 0;
   struct Quality {
     double states_a_second = 0;
@@ -57,7 +56,7 @@ class R4LINK_API BoardUnderTest {
   ~BoardUnderTest() = default;
 };
 
-// `board`: in control, and used by nobody else meanwhile. `others`: URLs that lead to it, too.
+// `board`: in control, not used elsewhere meanwhile. `others`: further URLs of the same board.
 class R4LINK_API BoardOnLink final : public BoardUnderTest {
  public:
   explicit BoardOnLink(Board& board, std::vector<std::string> others = {});

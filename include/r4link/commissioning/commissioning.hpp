@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Checks a board step by step with a person, in the order of the paper's sections 7.3 to 8.5, and
-// learns how it is wired (docs/how-to/commissioning.md):
+// learns its wiring (docs/how-to/commissioning.md):
 //
 //     r4::Board board("serial:auto");
 //     r4::commissioning::BoardOnLink tested(board);
 //     r4::commissioning::Commissioning commissioning(tested, person);
 //     commissioning.run_all();
-//     commissioning.offer();                              // the wiring and settings that it learnt
+//     commissioning.offer();                              // the learnt wiring and settings
 //     write_html(commissioning.report());
 //
-// Safety. Nothing moves before it was announced and the person holds the key. One output at a time
-// moves, for half a second or as announced, a motor at a tenth of full duty. Then, or when the
-// person lets go, its setpoint becomes 0, and relay 1 opens. If anything fails meanwhile (link,
+// Safety. Each movement is announced, and begins only when the person holds the key. One output at
+// a time moves, for half a second or as announced, a motor at a tenth of full duty. Then, or when
+// the person releases the key, the setpoint becomes 0, and relay 1 opens. After a failure (link,
 // exception, supervision), the board is stopped, or goes safe because the heartbeats end.
 #pragma once
 
@@ -36,29 +36,29 @@ R4LINK_API const char* to_text(Section section);
 struct Check {
   std::string id;  // "osmc 1", "supply AIN24", "silence"
   Section section;
-  std::string_view moves;  // what moves; empty: nothing
+  std::string_view moves;  // the moving part; empty: no movement
   std::string_view about;  // one sentence
-  int row;                 // in the table of host/commissioning/checks.cpp
-  int channel;             // from 1; 1 also for a thing of which there is one
+  int row;                 // index in the table of host/commissioning/checks.cpp
+  int channel;             // from 1; 1 also for a thing without channels
 };
-// All checks, in their order.
+// All checks in order.
 R4LINK_API const std::vector<Check>& checks();
 // Throws Error{usage} if there is no such check.
 R4LINK_API const Check& check_named(std::string_view id);
 
 class R4LINK_API Commissioning {
  public:
-  // Continues `begun`, of the same board: else run() throws Error{usage}. Board and person must
-  // outlive it.
+  // Continues `begun`. If it is a report of another board, run() throws Error{usage}. `board` and
+  // `person` must outlive the Commissioning.
   Commissioning(BoardUnderTest& board, Person& person, Report begun = {});
 
-  // Does one check, again if it was done, and puts its result into the report. Throws Error if the
-  // link is lost: the report stays, and the board must be opened again.
+  // Does a check, also a second time, and puts the result into the report. If the link is lost,
+  // throws Error: the report is kept, and the board must be opened again.
   enum class End : std::uint8_t { done, left };
   End run(std::string_view id);
-  // Does all checks that are neither passed nor found, or of these those in `only` (done or not).
+  // Does all checks that are neither passed nor found; or the checks in `only`, done or not.
   End run_all(const std::vector<std::string>& only = {});
-  // Asks whether the board may keep what was learnt, gives it, and sees that it is kept.
+  // Asks whether the board may keep the learnt wiring and settings, sends and verifies them.
   End offer();
 
   const Report& report() const { return report_; }
@@ -75,7 +75,7 @@ class R4LINK_API Commissioning {
   Person& person_;
   Report report_;
   bool identified_ = false;
-  bool ready_[2] = {};  // the person has confirmed that the section may begin
+  bool ready_[2] = {};  // the person has confirmed the start of the section
 };
 
 }  // namespace r4::commissioning

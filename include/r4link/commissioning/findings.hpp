@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The faults that a commissioning can find at a board. Each finding names its thing, such as
-// "osmc 1".
+// The faults that a commissioning can find. Each finding names a thing, such as "osmc 1".
 #pragma once
 
 #include <cstdint>
@@ -48,12 +47,12 @@ enum class Finding : std::uint8_t {
 };
 
 struct FindingText {
-  std::string_view name;   // "handle inverted": for scripts; does not change
+  std::string_view name;   // "handle inverted", for scripts; stable
   std::string_view wrong;  // one sentence
-  std::string_view fix;    // what to do
+  std::string_view fix;    // one sentence
 };
 R4LINK_API const FindingText& text_of(Finding finding);
-// The inverse of FindingText::name; Finding::count if there is none.
+// The inverse of FindingText::name; Finding::count for an unknown name.
 R4LINK_API Finding finding_named(std::string_view name);
 
 }  // namespace r4::commissioning

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report of a commissioning: what was checked, measured, found, learnt and left out. As JSON it
-// is also what a later run resumes from; as HTML it is one file for people.
+// The report of a commissioning: checks, measurements, findings, learnt changes and omissions. A
+// later run can resume from the JSON form. The HTML form is one file for people.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +16,11 @@
 namespace r4::commissioning {
 
 enum class Status : std::uint8_t {
-  not_done,  // `note` says why, if it was tried
+  not_done,  // `note`: why, if it was tried
   passed,
-  found,        // something is wrong
+  found,        // the check has found a fault
   skipped,      // by the person
-  unsupported,  // this board or transport cannot do it: `note`
+  unsupported,  // this board or transport does not support the check: `note`
 };
 // "not done", "passed", "found", "skipped", "unsupported".
 R4LINK_API const char* to_text(Status status);
@@ -37,17 +37,16 @@ struct Found {
   std::string detail;  // "osmc 2 moved"; may be empty
 };
 
-// A change of the wiring or of a setting that would agree with what was seen. The board was not
-// given it yet.
+// A change of the wiring or of a setting that agrees with the observations, for the board to keep.
 struct Learnt {
   enum class What : std::uint8_t {
-    serves,      // the places of `signal` serve the thing of `other`
-    option,      // the option of `signal` is the other one
+    serves,      // the places of `signal` belong to the thing of `other`
+    option,      // the option of `signal` has the other value
     place,       // `signal` is at `place`
     full_scale,  // of the analog input `signal`: `factor` times the present one
   };
   What what = What::serves;
-  int signal = 0;  // index in Wiring; of a thing with several signals the first
+  int signal = 0;  // index in Wiring; for a thing with several signals, the first
   int other = 0;
   Place place;
   double factor = 1;
@@ -63,25 +62,25 @@ struct CheckResult {
 };
 
 struct Report {
-  std::string begun;     // time of day, as the program that began it writes it
+  std::string begun;     // time of day, in the form of the program that began the report
   std::string software;  // version of R4 link on the host
   std::string url;
   std::string board_id, board_name, firmware, capabilities;
   std::string wiring_source;        // "plan", "given", "damaged"; empty: unknown
-  Wiring wiring = plan_wiring();    // that the board keeps; if unknown, the plan
-  std::vector<CheckResult> checks;  // in the order of the table
+  Wiring wiring = plan_wiring();    // the wiring that the board keeps; if unknown, the plan
+  std::vector<CheckResult> checks;  // in the order of checks()
 
-  // Everything that was found.
+  // The findings of all checks.
   R4LINK_API std::vector<Found> found() const;
 };
 
-// The report's wiring with all that was learnt. Of things that were exchanged, all must have been
-// checked: otherwise a place serves two signals, and check() says so.
+// The report's wiring with all learnt changes. If things were exchanged, check all of them:
+// otherwise a place serves two signals, and check() reports a fault.
 R4LINK_API Wiring learnt_wiring(const Report& report);
 
 R4LINK_API std::string write_json(const Report& report);
 constexpr std::size_t max_report_text = 1024 * 1024;  // bytes
-// `name` is that of the file, for errors. Throws Error{data}.
+// `name`: the file's name, for errors. Throws Error{data}.
 R4LINK_API Report read_report(std::string_view json, const std::string& name);
 // Also throws Error{open} or Error{permission}.
 R4LINK_API Report load_report(const std::string& path);

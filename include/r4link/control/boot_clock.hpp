@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A clock that runs while this computer sleeps, and a watch that notices a sleep. In a suspended
-// computer the steady clock (CLOCK_MONOTONIC) stands still, with every timer and deadline. The boot
-// clock (CLOCK_BOOTTIME) runs: it measures periods in a human's time.
+// A clock that runs while this computer sleeps, and a detector of sleeps. While a computer is
+// suspended, the steady clock (CLOCK_MONOTONIC) stops, with every timer and deadline. The boot
+// clock (CLOCK_BOOTTIME) continues, so it measures real time.
 #pragma once
 
 #include <algorithm>
@@ -26,8 +26,8 @@ struct BootClock {
   }
 };
 
-// How long this computer has slept since power-on: the boot clock's lead over the steady clock. The
-// clocks are read one after the other, and the thread may be preempted in between.
+// The time for which this computer has slept since power-on: the boot clock's lead over the steady
+// clock. Two bounds, because the thread may be preempted between reading the clocks.
 inline Time slept_at_most(Time steady) {
   return std::chrono::duration_cast<Time>(BootClock::now().time_since_epoch()) - steady;
 }
@@ -37,7 +37,7 @@ inline Time slept_at_least() {
                                           std::chrono::steady_clock::now().time_since_epoch());
 }
 
-// Does not mistake a thread without a processor or a stopped process for a sleep.
+// A delayed thread or a stopped process does not count as a sleep.
 class SleepWatch {
  public:
   // True if the computer slept longer than `limit` since construction or the last true.
@@ -51,7 +51,7 @@ class SleepWatch {
     before_ = most;
     return true;
   }
-  // The least time that it slept since then.
+  // The least time of sleep since construction or the last true.
   Time time() const { return std::max(slept_at_least() - before_, Time{0}); }
 
  private:

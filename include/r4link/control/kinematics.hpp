@@ -22,7 +22,7 @@ inline constexpr double no_limit = std::numeric_limits<double>::infinity();
 class R4LINK_API DifferentialDrive {
  public:
   struct Geometry {
-    double separation_m = 0;          // between the wheels' middles
+    double separation_m = 0;          // between the centres of the wheels
     double max_wheel_m_s = no_limit;  // limit of the faster wheel
   };
   struct Wheels {
@@ -44,8 +44,8 @@ class R4LINK_API FourWheelDrive {
  public:
   struct Geometry {
     double track_m = 0;  // from left to right wheels
-    // How much wider than its track the robot behaves: it turns by 1/slip of a differential drive's
-    // angle. Measure it on your ground; 1.5 to 2 on hard ground (Mandow et al., Experimental
+    // The effective track divided by the track: the robot turns by 1/slip of a differential drive's
+    // angle. Measure the slip on your ground; 1.5 to 2 on hard ground (Mandow et al., Experimental
     // kinematics for wheeled skid-steer mobile robots, IROS 2007).
     double slip = 1.5;
     double max_wheel_m_s = no_limit;
@@ -59,15 +59,15 @@ class R4LINK_API FourWheelDrive {
   };
   explicit FourWheelDrive(const Geometry& geometry);
   Wheels wheels(const Twist& twist) const;
-  // Uses the mean of the wheels of a side.
+  // Uses the mean speed of the two wheels on each side.
   Twist twist(const Wheels& wheels) const;
 
  private:
   DifferentialDrive sides_;
 };
 
-// A car; its position is the middle of the rear axle. Computed as a bicycle with the same wheelbase
-// (Siegwart et al., Introduction to Autonomous Mobile Robots, 2nd ed., 3.2).
+// A car whose position is the middle of the rear axle. Computed as a bicycle with the same
+// wheelbase (Siegwart et al., Introduction to Autonomous Mobile Robots, 2nd ed., 3.2).
 class R4LINK_API Ackermann {
  public:
   struct Geometry {
@@ -86,12 +86,12 @@ class R4LINK_API Ackermann {
     double right_rad = 0;
   };
   explicit Ackermann(const Geometry& geometry);
-  // A path too narrow for the steering becomes the narrowest possible; on the spot it stands.
+  // A curve too tight for the steering becomes the tightest possible; a turn on the spot becomes 0.
   Command command(const Twist& twist) const;
-  // Also for speeds and angles beyond the limits.
+  // Also accepts speeds and angles beyond the limits.
   Twist twist(const Command& command) const;
   double limited_steering(double steering_rad) const;
-  // The angle of each front wheel without slip: larger for the inner one.
+  // The angle of each front wheel without slip: larger for the inner wheel.
   FrontWheels front_wheels(double steering_rad) const;
   // Rim speeds of the rear wheels, for two motors or a differential.
   DifferentialDrive::Wheels rear_wheels(const Command& command) const;

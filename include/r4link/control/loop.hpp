@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A control loop that runs once per state of the board, and ends if its input is not reliable.
+// A control loop that runs once per state of the board, and ends if its input is unreliable.
 //
 //     r4::control::LoopOptions options;
 //     options.fields = "ENC1";
@@ -11,16 +11,16 @@
 //     });
 //     std::puts(end.why.c_str());
 //
-// Each new state with the needed fields causes a step, with the time since the last step on the
-// board's clock: delays, losses and bursts of the link do not falsify it. The loop ends when
+// Each new state with the needed fields causes a step. The time since the last step is measured on
+// the board's clock, so delays, losses and bursts of the link do not falsify it. The loop ends when
 //
-//     late         the newest such state was sampled longer ago than `late`
+//     late         the newest state with these fields was sampled longer ago than `late`
 //     not active   the board is safe, or the link to it is not up
 //     disarmed     output commands are refused: Board::disarmed_by()
-//     standstill   a motor is driven, and its encoder does not move
-//     asked        the step asks for it
+//     standstill   a motor is driven, but its encoder does not move
+//     asked        the step returns no setpoints
 //
-// and then sets the outputs to `rest`, confirmed by the board. It does not restart by itself.
+// and then sets the outputs to `rest`, confirmed by the board. It does not restart automatically.
 #pragma once
 
 #include <chrono>
@@ -41,13 +41,13 @@ enum class LoopEnd : std::uint8_t { none, asked, late, not_active, disarmed, sta
 // "none", "asked", "late", "not active", "disarmed", "standstill"; "unknown" for other numbers.
 R4LINK_API const char* to_text(LoopEnd end);
 
-// A blocked motor burns, and a loop whose encoder is unplugged drives at full duty.
+// A blocked motor may burn. A loop with an unplugged encoder would drive at full duty.
 struct Standstill {
   int encoder = 1;                        // ENCn
   CommandKind drive = CommandKind::osmc;  // or dhb12, bldc
   int channel = 1;
-  int pwm = 400;                        // if driven with at least this, of 4095 …
-  int counts = 3;                       // … the encoder must move by more than this …
+  int pwm = 400;                        // if driven with at least this duty, of 4095 …
+  int counts = 3;                       // … the encoder must move by more counts than this …
   std::chrono::milliseconds time{500};  // … within this time
 };
 
@@ -55,7 +55,7 @@ struct LoopOptions {
   // Names of the state fields that each step needs, "ENC1,AINSTEER". Request them from the board
   // with SessionOptions::fields or Board::fields().
   std::string fields = {};
-  // Longest age of the newest state with these fields.
+  // Longest age of the newest state with `fields`.
   std::chrono::milliseconds late{100};
   // Time limit for the first state.
   std::chrono::milliseconds first{1000};
@@ -63,11 +63,11 @@ struct LoopOptions {
 
   // For run_loop() only:
 
-  // As SessionOptions::arming of the board.
+  // The same as SessionOptions::arming of the board.
   Arming arming = Arming::required;
-  // The outputs after the loop: 0 for each motor that it drives. Must not be empty.
+  // The outputs after the loop: 0 for each motor that the loop drives. Must not be empty.
   Setpoints rest = {};
-  // If the board does not confirm `rest` within this time, it is stopped (E:STOP).
+  // If the board does not confirm `rest` within this time, the loop stops it (E:STOP).
   std::chrono::milliseconds rest_timeout{200};
   // If a step takes longer, the heartbeats stop: the board goes safe (Board::watchdog()). 0: off.
   std::chrono::milliseconds watchdog{300};
@@ -75,31 +75,31 @@ struct LoopOptions {
 
 struct LoopStep {
   const ReceivedState& state;
-  double dt_s = 0;  // on the board's clock, since the last step; 0 in the first
+  double dt_s = 0;  // on the board's clock, since the last step; 0 in the first step
 };
 
-// The loop without board, thread or clock: for an AsyncBoard, a simulation or another kind of loop.
+// The loop without a board, thread or clock: for an AsyncBoard, a simulation or a loop of your own.
 class R4LINK_API LoopGuard {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // Throws Error{usage} for unknown fields, channels and encoders, and times not above 0.
+  // Throws Error{usage} for unknown fields, channels and encoders, and for times not above 0.
   explicit LoopGuard(LoopOptions options);
 
   void start(Clock::time_point now);
   // Call it for each state. If a step is due, returns the seconds since the last step.
   std::optional<double> on_state(const ReceivedState& state, DisarmCause disarmed,
                                  Clock::time_point now);
-  // The step's commands. A motor that they do not name keeps its last command.
+  // Call it with the commands of each step. A motor without a command keeps its last command.
   void on_commanded(const Setpoints& setpoints);
   // Call it at deadline(), and when the link or the arming changes. LoopEnd::none: continue.
   LoopEnd check(HostLinkState link, DisarmCause disarmed, Clock::time_point now);
-  // When the states will be late, if none comes before.
+  // When the loop ends as late, unless a state comes before.
   Clock::time_point deadline() const { return deadline_; }
   void end(LoopEnd cause, std::string why);
 
   LoopEnd ended() const { return end_; }
-  // In words: "ENC1 stands still, although OSMC 1 is driven with 1200 for 500 ms; …".
+  // The end in words: "ENC1 stands still, although OSMC 1 is driven with 1200 for 500 ms; …".
   const std::string& why() const { return why_; }
 
  private:
@@ -117,9 +117,9 @@ class R4LINK_API LoopGuard {
   LoopOptions options_;
   FieldSet needed_;
   std::vector<Motor> motors_;
-  FieldSet got_;  // of the state of got_ms_
+  FieldSet got_;  // fields of the state with T got_ms_
   std::uint32_t got_ms_ = 0;
-  std::optional<std::uint32_t> last_ms_;  // of the last step
+  std::optional<std::uint32_t> last_ms_;  // T of the last step
   Clock::time_point deadline_ = Clock::time_point::max();
   LoopEnd end_ = LoopEnd::none;
   std::string why_;
@@ -128,15 +128,15 @@ class R4LINK_API LoopGuard {
 struct LoopReport {
   LoopEnd end = LoopEnd::none;
   std::string why;
-  // True if the outputs are at `rest` or safe. False: not even a stop was confirmed, see `why`.
+  // True if the outputs are at `rest` or safe. False: neither `rest` nor a stop was confirmed.
   bool at_rest = false;
   std::uint64_t steps = 0;
 };
 
-// Runs the loop on this thread until it ends. The step returns setpoints to post, or nothing to end
-// it. Sets the board's recovery to `rearm`, so that outputs do not come back after a lost link when
-// no loop runs. Throws what the step throws, after the outputs are at rest. Throws Error{usage} for
-// wrong options (also an empty `rest`), and as Board does if it does not answer.
+// Runs the loop on this thread until it ends. The step returns setpoints to post, or std::nullopt
+// to end the loop. Sets the board's recovery to `rearm`: then a lost link does not restore outputs
+// when no loop runs. An exception from the step is thrown when the outputs are at rest. Throws
+// Error{usage} for wrong options (also an empty `rest`), and errors of Board without an answer.
 R4LINK_API LoopReport
 run_loop(Board& board, const LoopOptions& options,
          const std::function<std::optional<Setpoints>(const LoopStep&)>& step);

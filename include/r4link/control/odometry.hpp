@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::control::Odometry: the pose of a robot from the motion of its wheels, and its uncertainty.
-// Each step is an arc of a circle with independent errors in length and angle, whose variances grow
-// with them, so that steered robots fit too. The covariance grows by first-order propagation
-// (Siegwart et al., Introduction to Autonomous Mobile Robots, 2nd ed., 5.2.4). Metres and radians;
-// x forward, y and positive angles to the left (REP 103).
+// Each step is an arc of a circle with independent errors in length and angle. Their variances grow
+// with the length and the angle, so the model also fits steered robots. The covariance grows by
+// first-order propagation (Siegwart et al., Introduction to Autonomous Mobile Robots, 2nd ed.,
+// 5.2.4). Metres and radians; x forward, y and positive angles to the left (REP 103).
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ struct Pose {
   friend bool operator==(const Pose&, const Pose&) = default;
 };
 
-// The defaults suit tyres on a hard floor; measure yours.
+// The defaults suit tyres on a hard floor; measure the values of your robot.
 struct OdometryNoise {
   double length_per_m = 0.0004;  // m^2 per metre: a standard deviation of 2 cm after one metre
   double turn_per_m = 0.0004;    // rad^2 per metre
@@ -33,9 +33,8 @@ class R4LINK_API Odometry {
   // Throws Error{usage} for a variance that is negative or not a number.
   explicit Odometry(const OdometryNoise& noise = {});
 
-  // The robot has moved by this length (negative: backwards) and turned by this angle meanwhile.
+  // The robot has moved by `length_m` (negative: backwards) and turned by `turn_rad` meanwhile.
   void advance(double length_m, double turn_rad);
-  // Sets a known pose.
   void reset(const Pose& pose = {}, const Covariance& covariance = {});
 
   const Pose& pose() const { return pose_; }

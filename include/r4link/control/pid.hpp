@@ -9,10 +9,10 @@
 //     feed_forward * setpoint       the right output for a perfect model
 //     kp * error                    error = setpoint - measured
 //     ki * integral of the error    held while the output cannot follow the error (anti-windup)
-//     -kd * d(measured)/dt          low-passed; of the measured value: a new setpoint gives no kick
+//     -kd * d(measured)/dt          low-pass filtered; a step of the setpoint causes no kick
 //
 // limited in value and rate (Astrom and Murray, Feedback Systems, 2nd ed., chapter 11). Setpoint
-// and measured value have one unit, the output may have another. No clock, no heap.
+// and measured value have the same unit; the output may have another unit. No clock, no heap.
 #pragma once
 
 #include <limits>
@@ -28,7 +28,7 @@ struct PidOptions {
   double feed_forward = 0;  // output per unit of setpoint
   double minimum = -1;      // of the output
   double maximum = 1;
-  double rate = std::numeric_limits<double>::infinity();  // of the output, per second, up and down
+  double rate = std::numeric_limits<double>::infinity();  // per second, up and down
   double derivative_filter_s = 0;  // time constant of the derivative's low-pass filter; 0: none
 };
 
@@ -42,12 +42,12 @@ class R4LINK_API Pid {
   // Error{data} for a value that is not finite.
   double step(double setpoint, double measured, double dt_s);
   double output() const { return output_; }
-  // Its integral term, in units of the output.
+  // The integral term, in units of the output.
   double integral() const { return integral_; }
 
-  // Resets all: the output is 0, or the limit nearest to it.
+  // Resets all: the output becomes 0, or the limit nearest to 0.
   void reset();
-  // Continues without a jump from an output that another controller has set, through the integral.
+  // Continues without a jump from the output of another controller: sets the integral.
   void take_over(double output, double setpoint, double measured);
 
  private:
@@ -56,7 +56,7 @@ class R4LINK_API Pid {
   PidOptions options_;
   double integral_ = 0;
   double derivative_ = 0;
-  double measured_ = 0;  // in the last step
+  double measured_ = 0;  // of the last step
   bool has_measured_ = false;
   double output_ = 0;
 };

@@ -14,25 +14,25 @@ namespace r4::control {
 
 struct WheelGeometry {
   int encoder = 1;           // 1-4
-  double counts_a_turn = 0;  // of the wheel: the encoder's, times the gear's ratio
+  double counts_a_turn = 0;  // of the wheel: counts of the encoder times the gear ratio
   double radius_m = 0;
-  bool reversed = false;  // it counts down when the robot goes forward
+  bool reversed = false;  // counts down when the robot moves forward
 };
 
-// A wheel with an encoder. Give it each state, in order.
+// A wheel with an encoder. Pass each state to advance(), in order.
 class R4LINK_API Wheel {
  public:
-  // `window_ms`: averaging time of speed_m_s(), above 0. A speed above `max_speed_m_s` is not a
-  // motion, but a restarted board or an encoder set to zero. Throws Error{usage} for an encoder
-  // outside 1-4, and for a radius, counts, limit or window that are not above 0.
+  // `window_ms`: averaging time of speed_m_s(), above 0. A speed above `max_speed_m_s` counts as a
+  // restarted board or a zeroed encoder, not as motion. Throws Error{usage} for an encoder outside
+  // 1-4, and for a radius, counts, limit or window that is not above 0.
   explicit Wheel(const WheelGeometry& geometry, std::uint32_t window_ms = 50,
                  double max_speed_m_s = 20);
 
-  // The distance since the previous state, m, by ENCn; 0 at first.
+  // The distance in m since the previous state, from ENCn; 0 in the first call.
   double advance(const State& state);
-  // The speed by the counts of the last window, half a window old. Needs ENCn in each state.
+  // The speed from the counts of the last window, so half a window old. Needs ENCn in each state.
   double speed_m_s() const { return speed_m_s_; }
-  // The speed by ENCnHZ: updated ten times a second, 50 to 150 ms old. Needs this state only.
+  // The speed from ENCnHZ: updated ten times a second, 50 to 150 ms old. Needs only this state.
   double measured_m_s(const State& state) const;
   double metres_a_count() const { return metres_a_count_; }
   int encoder() const { return geometry_.encoder; }
@@ -55,7 +55,7 @@ class R4LINK_API Wheel {
   double speed_m_s_ = 0;
 };
 
-// The steering angle by AINSTEER: linear between two angles with measured voltages.
+// The steering angle from AINSTEER: linear between two angles with measured voltages.
 class R4LINK_API SteeringSensor {
  public:
   struct Calibration {
@@ -63,16 +63,15 @@ class R4LINK_API SteeringSensor {
     double left_rad = 0;     // above 0
     double right_volts = 0;  // at right_rad
     double right_rad = 0;    // below 0
-    // A voltage farther beyond the ends means an unplugged cable or a broken sensor.
+    // A voltage farther outside means an unplugged cable or a broken sensor.
     double margin_volts = 0.3;
   };
   // Throws Error{usage} unless the voltages differ by more than 0.01 V, left_rad is above
   // right_rad, and margin_volts is not negative.
   explicit SteeringSensor(const Calibration& calibration);
 
-  // Empty if the voltage is not possible: then do not steer by it, and do not drive.
+  // Empty if the voltage is impossible: then do not steer, and do not drive.
   std::optional<double> angle_rad(const State& state) const;
-  // The voltage at an angle.
   double volts(double angle_rad) const;
 
  private:

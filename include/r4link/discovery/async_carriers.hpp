@@ -13,21 +13,21 @@
 
 namespace r4 {
 
-// The host's carrier for a URL, not yet opened. Throws Error{usage}. A watcher leaves the port of
-// hosts (UDP 2390) to controlling hosts: it takes any free port, unless the URL names one.
+// The host's carrier for a URL, not yet opened. Throws Error{usage}. A watcher uses any free UDP
+// port, unless the URL names a port: port 2390 is for controlling hosts.
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
                                            BoardRole role);
 
 // The carriers of all paths to one board. A text may join URLs (url_pattern.hpp). Throws
-// Error{usage} for no URL, too many, a duplicate, and a sim: or replay: among several. Only the
-// first udp: URL has the port of hosts, unless the URLs name ports.
+// Error{usage} for no URL, too many URLs, a duplicate, and a sim: or replay: among several URLs.
+// Unless the URLs name ports, only the first udp: URL uses port 2390.
 std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
                                                          const std::vector<std::string>& urls,
                                                          BoardRole role);
 
 // A host's carrier that is not shared with other programs of this computer, not yet opened. It
-// works while a program that holds the transport hangs: on a network it takes any free port, on a
-// bus it sends beside that program. Only one program can have a serial port. Throws Error{usage}.
+// works while another program holds the transport and hangs: on any free UDP port, or on a bus
+// beside that program. Only one program can use a serial port. Throws Error{usage}.
 std::unique_ptr<Carrier> make_own_carrier(asio::io_context& io, std::string_view url);
 
 }  // namespace r4

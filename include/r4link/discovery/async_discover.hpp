@@ -22,8 +22,8 @@
 
 namespace r4 {
 
-// The thread of the searches of one io_context, because a search blocks. The io_context joins it
-// and destroys the handlers of searches that have not begun.
+// The thread for the searches of one io_context, because a search blocks. The io_context joins the
+// thread, and destroys the handlers of searches that have not begun.
 class DiscoveryThread final : public asio::execution_context::service {
  public:
   inline static asio::execution_context::id id;
@@ -37,10 +37,10 @@ class DiscoveryThread final : public asio::execution_context::service {
   std::optional<asio::thread_pool> pool_{std::in_place, 1};
 };
 
-// void(std::exception_ptr, Discovery). Searches as discover() does, on a thread of its own, one
+// void(std::exception_ptr, Discovery). Searches as discover() does, on a separate thread, one
 // search at a time for each io_context. The handler runs on its associated executor, else on
-// `executor`, and gets what discover() throws. A search cannot be cancelled: an io_context that is
-// destroyed waits until the search under way has ended, 1.3 s at most.
+// `executor`, and receives errors of discover(). A search cannot be cancelled: the destructor of
+// the io_context waits for it, 1.3 s at most.
 template <class Token>
 auto async_discover(const asio::io_context::executor_type& executor, DiscoveryOptions options,
                     Token&& token) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transports that a URL can name, as the help of a program lists them.
+// The transports that a URL can name, for the help of a program.
 #pragma once
 
 #include <string>

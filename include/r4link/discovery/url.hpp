@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The place of a board: the URL grammar of every transport (docs/reference/transports.md).
+// The URL of a board: the grammar for every transport (docs/reference/transports.md).
 //
 //     url    = scheme ":" ["//" authority] [path] ["?" key "=" value *("&" key "=" value)]
 //     scheme = udp | serial | pty | sim | …        authority = HOST[:PORT] | [IPv6][:PORT]
@@ -20,10 +20,10 @@ namespace r4 {
 
 class Url {
  public:
-  // Throws Error{usage} that names the URL and what is wrong with it.
+  // Throws Error{usage} with the URL and the fault.
   R4LINK_API static Url parse(std::string_view text);
 
-  const std::string& text() const { return text_; }  // as it was given
+  const std::string& text() const { return text_; }  // the text that was parsed
   const std::string& scheme() const { return scheme_; }
   const std::string& host() const { return host_; }  // without brackets
   std::optional<std::uint16_t> port() const { return port_; }
@@ -31,7 +31,7 @@ class Url {
 
   // The value of a key, if the URL has it.
   R4LINK_API std::optional<std::string> get(std::string_view key) const;
-  // The same; removes the key.
+  // Returns the value of a key and removes the key.
   R4LINK_API std::optional<std::string> take(std::string_view key);
   // The value as a whole number, or `fallback`. Throws Error{usage} unless it is within [min, max].
   R4LINK_API long get_number(std::string_view key, long min, long max, long fallback) const;
@@ -44,7 +44,7 @@ class Url {
   std::map<std::string, std::string, std::less<>> query_;
 };
 
-// The text as a value in a URL: what a URL, a shell or a terminal may interpret becomes %NN.
+// The text as a value in a URL: characters with a meaning in a URL, shell or terminal become %NN.
 R4LINK_API std::string percent_encoded(std::string_view text);
 
 }  // namespace r4

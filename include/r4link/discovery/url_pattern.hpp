@@ -4,16 +4,16 @@
 //     can://can0?node=0-7                      udp://127.0.0.1:20000-20999
 //     udp://10.0.0.{1-250}                     udp://arm-{1,3,07-12}
 //
-// A range of nodes or of ports needs no braces. If there are several braces, the last one counts
-// fastest. A number that begins with 0 keeps its width: {07-12} is 07, 08 …
+// A range of nodes or of ports needs no braces. With several braces, the last one counts fastest. A
+// number that begins with 0 keeps its width: {07-12} is 07, 08 …
 //
 // One text also joins several paths to one board (docs/how-to/redundancy.md):
 //
 //     serial:auto+udp://192.168.0.125          can://can0?node=0-7+can://can1?node=0-7
 //
-// A '+' joins only if the scheme of a URL and its colon follow. Elsewhere it is an ordinary
-// character, as %2B always is. All patterns of a text stand for equally many URLs: the first board
-// has the first URL of each, and so on. A part without a pattern names one board.
+// A '+' joins only before the scheme of a URL and its colon. Elsewhere '+' is an ordinary
+// character, and %2B always is. All patterns of a text must stand for the same number of URLs: the
+// first board has the first URL of each, and so on. A part without a pattern names one board.
 #pragma once
 
 #include <cstddef>
@@ -26,23 +26,23 @@
 namespace r4 {
 
 struct PatternUrl {
-  std::string url;     // with several paths: joined
+  std::string url;     // with several paths: joined by '+'
   std::string number;  // the numbers in place of the pattern, "7" or "3-7"; empty without a pattern
 };
 
-// More would be a typing mistake.
+// A larger number is probably a typing mistake.
 constexpr std::size_t most_pattern_urls = 10'000;
 
 // The URLs that a pattern stands for, in order; a URL stands for itself. Throws Error{usage} for
 // invalid braces and ranges, for more than most_pattern_urls, and if a result is not a valid URL.
 R4LINK_API std::vector<PatternUrl> expand_urls(std::string_view pattern);
-// The same for several texts. Also throws Error{usage} if two of them name the same URL.
+// The URLs of several patterns. Also throws Error{usage} for a duplicate URL.
 R4LINK_API std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
 
-// The URLs that a text joins. They are not checked.
+// The URLs that a text joins, without a check.
 R4LINK_API std::vector<std::string> split_paths(std::string_view text);
 R4LINK_API std::string join_paths(const std::vector<std::string>& urls);
-// True if one of the joined URLs has that scheme.
+// True if one of the joined URLs has the scheme.
 R4LINK_API bool has_path(std::string_view text, std::string_view scheme);
 
 }  // namespace r4

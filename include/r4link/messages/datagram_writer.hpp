@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes one datagram into a buffer of the caller.
+// Writes one datagram into the caller's buffer.
 //
 //     char buffer[max_datagram];
 //     DatagramWriter w(buffer, sizeof buffer);
 //     w.field("O").value(358).value(1).value(1);
 //     Text datagram = w.finish(pnum, t_ms);   // "O:358,1,1;PNum:66;T:79146;^0x…^"
 //
-// If anything does not fit, or a name or text has bytes that the grammar (datagram.hpp) does not
-// allow, finish() returns an empty Text. So no text can forge a field.
+// If the datagram does not fit, or a name or text has bytes that the grammar (datagram.hpp)
+// forbids, finish() returns an empty Text. So a text cannot forge a field.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +19,8 @@
 
 namespace r4 {
 
-// A name that is a compile-time constant, in wire form ";OSMC1:", so that writing needs no check
-// and no loop. At most 12 characters: longer names do not compile.
+// A field name as a compile-time constant in wire form, ";OSMC1:", so that writing needs no check
+// and no loop. A name of more than 12 characters does not compile.
 class FieldName {
  public:
   constexpr FieldName() = default;
@@ -28,10 +28,10 @@ class FieldName {
     text_[0] = ';';
     for (std::size_t i = 0; i < name.size(); ++i) text_[i + 1] = name[i];
     text_[name.size() + 1] = ':';
-    text_[name.size() + 2] = '\0';  // outside of text_ if the name is longer
+    text_[name.size() + 2] = '\0';  // outside of text_ if the name is too long
   }
   constexpr Text name() const { return Text(text_ + 1, size_); }
-  // True if the name is of the grammar; for a static_assert.
+  // True if the grammar allows the name; for a static_assert.
   constexpr bool allowed() const {
     if (size_ == 0 || size_ > 12) return false;
     for (int i = 1; i <= size_; ++i) {
@@ -44,12 +44,12 @@ class FieldName {
  private:
   friend class DatagramWriter;
   char text_[15] = {};
-  std::uint8_t size_ = 0;  // of the name only
+  std::uint8_t size_ = 0;
 };
 
 class R4LINK_API DatagramWriter {
  public:
-  // Continues after the first `used` bytes of the buffer: size() of an earlier writer.
+  // Continues after the first `used` bytes of the buffer. `used`: size() of an earlier writer.
   DatagramWriter(char* buffer, std::size_t capacity, std::size_t used = 0)
       : begin_(buffer),
         at_(buffer + used),
@@ -63,33 +63,34 @@ class R4LINK_API DatagramWriter {
   DatagramWriter& value(std::uint32_t value);
   DatagramWriter& value(std::int32_t value);
   DatagramWriter& value(std::uint64_t value);
-  DatagramWriter& hundredths(std::int32_t value);  // 2428 is written as 24.28
-  // Writes a text as it is; it may hold commas: "ROS2-R4", "a,b".
+  DatagramWriter& hundredths(std::int32_t value);  // 2428: "24.28"
+  // Writes a text that may hold commas: "ROS2-R4", "a,b".
   DatagramWriter& values(Text text);
 
   // Continues the last value.
   DatagramWriter& more(Text text);
 
-  // The bytes written so far; ok(): all of them fitted and were allowed.
+  // The bytes written so far. ok(): all bytes fitted and were allowed.
   std::size_t size() const { return static_cast<std::size_t>(at_ - begin_); }
   Text written() const { return Text(begin_, size()); }
   bool ok() const { return ok_; }
 
-  // Removes everything after `size`, a size() before a field() while ok(); restores ok().
+  // Removes the bytes after `size`, a size() before a field() while ok(). Restores ok().
   void truncate(std::size_t size);
 
-  // Writes SID, before PNum; nothing for no_session.
+  // Writes SID, to be called before packet() or stamp(); no effect for no_session.
   DatagramWriter& session(SessionId sid);
-  // Writes PNum: the last field of a session's command, except a signature (authentication.hpp).
+  // Writes PNum, the last field of a session's command before a signature (authentication.hpp).
   DatagramWriter& packet(std::uint32_t pnum);
-  // Writes PNum and T: the last fields of any other datagram, except a signature.
+  // Writes PNum and T, the last fields of any other datagram before a signature.
   DatagramWriter& stamp(std::uint32_t pnum, std::uint64_t t_ms);
-  // Adds PNum, T and the CRC. Empty if anything did not fit or was not allowed, or is too long.
+  // Adds PNum, T and the CRC. Empty if ok() is false, or the datagram is too long.
   Text finish(std::uint32_t pnum, std::uint64_t t_ms);
-  // Ends the datagram with the CRC only: the caller has written PNum and T.
+  // Adds only the CRC: the caller has written PNum and T.
   Text finish();
 
-  // Most bytes of finish(pnum, t): ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
+  // The most bytes that finish(pnum, t) adds:
+  // ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
   static constexpr std::size_t trailer_max = 52;
 
  private:

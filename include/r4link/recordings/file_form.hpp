@@ -13,8 +13,8 @@
 namespace r4 {
 
 enum class FileForm : std::uint8_t {
-  text,  // text, and every unknown form
-  zstd,  // also with skippable frames at the front
+  text,  // text, and unknown forms
+  zstd,  // also with skippable frames first
   pcap,  // or pcapng
   mcap,
   gzip,
@@ -30,10 +30,10 @@ constexpr std::size_t form_bytes = 8;
 
 R4LINK_API FileForm form_of(std::string_view beginning);
 
-// The mark that some editors write in front of UTF-8.
+// The byte order mark that some editors write before UTF-8.
 constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
 
-// Says why a file of that form is not a recording, and how to make one of it.
+// An error that names the form, and how to make a recording from it.
 R4LINK_API Error not_a_recording(const std::string& name, FileForm form);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The states in a recording's datagrams. A state keeps the older fields of its path.
+// The states in a recording's datagrams. A missing field keeps the path's older value.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@ namespace r4 {
 
 class R4LINK_API RecordedStates {
  public:
-  // The record's state, merged with its path's; nullptr: not a state. Valid until the next call.
+  // The state, with older fields of its path; nullptr: not a state. Valid until the next call.
   const State* take(const Record& record);
-  // The datagram of the state from take(). Valid as long as the record.
+  // The datagram of the last take(). Valid as long as the record.
   const Datagram& datagram() const { return datagram_; }
-  // For on_header(): path numbers may have another meaning.
+  // Call it in on_header(): path numbers may have another meaning.
   void clear() { states_.clear(); }
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads a recording in pieces and in constant memory, also a long or damaged one. Damage is
-// reported with its place, and reading continues.
+// Reads a recording in pieces, in constant memory. Damage is reported with its place and skipped.
 #pragma once
 
 #include <cstdint>
@@ -21,13 +20,13 @@
 namespace r4 {
 
 // Reads the lines of the native format, in a file of any format. Successive recordings in one file,
-// each after its header, are accepted. Mixed ones, as `sort -m`, `mergecap` and `mcap merge` make
-// them, are refused: a path number means another board in each. The signs of a mixture are
+// each after its header, are accepted. Mixed recordings, as from `sort -m`, `mergecap` and `mcap
+// merge`, are refused: a path number means another board in each. The signs of a mixture are
 // - a header that follows a header, or a record that follows the end of the recording,
 // - a path whose URL changes without a header,
 // - lines, or datagrams of one path, from another stream (an interface of a capture, a channel of
 //   MCAP) without a new header or path.
-// After damage, which may explain such a sign, reading continues; the visitor gets damage_line.
+// Damage may explain such a sign: then reading continues, and the visitor gets damage_line.
 class R4LINK_API RecordingLines {
  public:
   static constexpr std::string_view damage_line = "# damage: a part before this could not be read";
@@ -36,16 +35,16 @@ class R4LINK_API RecordingLines {
   RecordingLines(RecordingVisitor& visitor, std::string name)
       : visitor_(visitor), name_(std::move(name)) {}
 
-  // Gives the content of a line to the visitor. Returns why it is not a line of a recording, or
-  // nullptr. Throws Error{data} for a later version of the format, and for mixed recordings.
+  // Passes the content of a line to the visitor. Returns nullptr, or why the line is not a line of
+  // a recording. Throws Error{data} for a later version of the format, and for mixed recordings.
   const char* on_line(std::string_view line, std::uint32_t stream = 0);
-  // Gives a record of that stream, which is not written as a line, to the visitor. `url`: of the
-  // board, from the stream; may be empty. Throws Error{data} for mixed recordings.
+  // Passes a record that is not a line to the visitor. `stream`: the stream of the record. `url`:
+  // the board's URL in the stream; may be empty. Throws Error{data} for mixed recordings.
   void on_record(const Record& record, std::uint32_t stream, std::string_view url);
 
   // A sign of a mixture. Throws Error{data}, unless damage may explain it.
   void on_sign_of_mixture();
-  // A part could not be read here.
+  // A part of the file could not be read here.
   void on_damage() {
     if (damage_ == Damage::none) damage_ = Damage::here;
   }
@@ -65,10 +64,10 @@ class R4LINK_API RecordingLines {
   const std::string name_;
   RecordLine read_;
   bool recognised_ = false;
-  bool after_header_ = false;  // only the header's own line has come
-  bool ended_ = false;         // of the newest recording
+  bool after_header_ = false;  // the last line was the header
+  bool ended_ = false;         // the newest recording has ended
   Damage damage_ = Damage::none;
-  std::optional<std::uint32_t> stream_;  // of the lines, since the newest header
+  std::optional<std::uint32_t> stream_;  // stream of the lines since the newest header
   std::map<std::uint16_t, Path> paths_;
 };
 
@@ -76,8 +75,8 @@ class R4LINK_API RecordingReader {
  public:
   RecordingReader(RecordingVisitor& visitor, std::string name);
 
-  // Takes the next bytes. Lines may end in CR LF, and the UTF-8 mark may precede them. Throws
-  // Error{data} for a later version of the format, for mixed recordings, and for other files.
+  // Reads the next bytes. Lines may end in CR LF, and the UTF-8 mark may precede the first line.
+  // Throws Error{data} for a later version of the format, mixed recordings, and other files.
   void feed(std::string_view bytes);
   // The file has ended. Throws Error{data} if it was not a recording.
   void finish();
@@ -97,13 +96,13 @@ class R4LINK_API RecordingReader {
   RecordingVisitor& visitor_;
   const std::string name_;
   std::unique_ptr<ZstdReader> zstd_;
-  std::string beginning_;       // magic_size bytes of the file, which show whether it is compressed
-  std::string text_beginning_;  // form_bytes of the text, which show its form
-  std::uint64_t taken_ = 0;     // bytes of the file
-  std::uint64_t line_ = 1;      // the number of the next line
-  std::uint64_t offset_ = 0;    // where it begins in the text
-  std::string part_;            // of a line whose end has not come
-  std::uint64_t part_size_ = 0;  // the size of that line so far; more than part_ if it is too long
+  std::string beginning_;        // the first magic_size bytes, which show a compressed file
+  std::string text_beginning_;   // the first form_bytes of the text, which show its form
+  std::uint64_t taken_ = 0;      // bytes of the file so far
+  std::uint64_t line_ = 1;       // the number of the next line
+  std::uint64_t offset_ = 0;     // offset of the next line in the text
+  std::string part_;             // the beginning of a line whose end has not come
+  std::uint64_t part_size_ = 0;  // size of this line; larger than part_ if too long
 };
 
 // Passes a file to `take` in pieces; "-": standard input. Blocks. Throws Error: open, permission.

@@ -17,8 +17,8 @@ namespace r4 {
 class R4LINK_API ZstdWriter {
  public:
   ZstdWriter();
-  // Appends to `out` everything that a reader needs to read all of `bytes`. `end_frame` ends the
-  // frame, so that later bytes can be read without the earlier bytes.
+  // Appends the compressed `bytes` to `out`, so that a reader can read all of them. `end_frame`
+  // ends the frame, so that later bytes can be read without these bytes.
   void write(std::string_view bytes, bool end_frame, std::string& out);
 
  private:
@@ -28,7 +28,7 @@ class R4LINK_API ZstdWriter {
   std::unique_ptr<ZSTD_CCtx_s, Free> context_;
 };
 
-// Reads frames one after the other. After damage it continues with the next frame.
+// Reads frames one after the other. After damage, reading continues with the next frame.
 class R4LINK_API ZstdReader {
  public:
   static constexpr const char* window_problem =
@@ -36,16 +36,16 @@ class R4LINK_API ZstdReader {
 
   ZstdReader();
   enum class Step : unsigned char {
-    more,     // all of the input is taken
-    text,     // some of the input is taken, and there is text(); call again
-    damaged,  // the input is damaged here; the next frame is searched for; call again
+    more,     // all input was taken
+    text,     // some input was taken, and text() has its text; call again
+    damaged,  // the input is damaged; call again to search for the next frame
   };
-  // Takes from the front of `bytes`.
+  // Removes the bytes that were read from the front of `bytes`.
   Step step(std::string_view& bytes);
   std::string_view text() const { return {output_.data(), size_}; }
   // Why step() returned damaged.
   const char* problem() const;
-  // True if the frame needs more memory than this reader takes: zstd --long=31 unpacks it.
+  // True if the frame needs more memory than this reader uses: zstd --long=31 unpacks the frame.
   bool window_too_large() const { return window_too_large_; }
   // True between two frames: the last frame is complete.
   bool between_frames() const { return !in_frame_; }
@@ -63,11 +63,11 @@ class R4LINK_API ZstdReader {
   bool in_frame_ = false;
   bool window_too_large_ = false;
   bool searching_ = false;
-  std::string last_;   // the last bytes that were taken
-  std::string found_;  // the beginning of the next frame, as far as it was found
+  std::string last_;   // the last bytes read
+  std::string found_;  // the part of the next frame's magic number that was found
 };
 
-// True if a file with that beginning holds frames of zstd; four bytes suffice.
+// True if a file with this beginning holds zstd frames. Needs four bytes.
 R4LINK_API bool is_zstd(std::string_view beginning);
 
 }  // namespace r4

@@ -19,7 +19,7 @@ struct R4LINK_API ChipPins {
   std::uint8_t relays = 0;                      // bit n-1: relay n
   Bldc bldc[bldc_channels];
 
-  // No output is driven, and every brake is on.
+  // Every output is off, and every brake is on.
   static ChipPins safe();
   bool is_safe() const;
 };
@@ -35,24 +35,24 @@ struct R4LINK_API Pins : ChipPins {
 
   bool is_safe() const;
 };
-// True if the outputs do the same; the steppers' positions are not compared.
+// True if the outputs are equal; the steppers' positions are not compared.
 R4LINK_API bool operator==(const Pins& a, const Pins& b);
 inline bool operator!=(const Pins& a, const Pins& b) { return !(a == b); }
 
-// A robot model in place of the bench vehicle (docs/how-to/simulation.md): its motors and sensors.
+// The motors and sensors of a robot in place of the bench vehicle (docs/how-to/simulation.md).
 class R4LINK_API RobotModel {
  public:
   struct Senses {
-    // Counts that encoder n turned in this millisecond; 0 at the start of each.
+    // Counts by which encoder n turned in this millisecond; reset to 0 before each call.
     std::int32_t encoder_turned[encoder_channels] = {};
-    // Hundredths of a volt, kept; `as_on_the_bench`: the bench sets it.
+    // Hundredths of a volt, kept between calls. `as_on_the_bench`: the bench sets the voltage.
     static constexpr std::int32_t as_on_the_bench = -1;
     std::int32_t analog_cv[analog_channels] = {as_on_the_bench, as_on_the_bench, as_on_the_bench,
                                                as_on_the_bench, as_on_the_bench, as_on_the_bench};
-    // Kept. 0: no echo.
+    // Kept between calls. 0: no echo.
     std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
   };
-  // One millisecond passes. Without supply no motor is driven, whatever its driver's pins say.
+  // Called for each millisecond. Without supply no motor turns, even if the pins drive it.
   virtual void pass_millisecond(const ChipPins& pins, bool motors_have_supply, Senses& senses) = 0;
 
  protected:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of the board (docs/reference/protocol.md, section 3): a row for each kind, with
-// values that have rows of their own, from board.def.
+// The commands of the board (docs/reference/protocol.md, section 3), from board.def: a row for each
+// kind of command and for each kind of value.
 //
 //     r4::row_of(r4::CommandKind::servo).channels                // 16
 //     r4::row_of(r4::CommandValue::pulse).max                    // 2500, microseconds
@@ -24,11 +24,11 @@ enum class CommandKind : std::uint8_t {
 
 enum class CommandEffect : std::uint8_t {
   none,
-  device,  // may move a device on a bus or UART of the user. Refused in the safe state
-  output,  // may move an output. Refused in the safe state; may be part of a group
+  device,  // may move a device on the user's bus or UART; refused in the safe state
+  output,  // may move an output; refused in the safe state; may be part of a group
 };
 
-// The member of `Command` that holds a value, and how the value is written.
+// The member of `Command` that holds a value, and the value's text form.
 enum class ValueRole : std::uint8_t {
   channel,
   value,
@@ -39,10 +39,10 @@ enum class ValueRole : std::uint8_t {
   on_off,  // Command::on, as On or Off; readers also accept 1 and 0
   count,
   period_ms,
-  bytes,  // Command::text, as "x3B00". From here on, a range is one of sizes
+  bytes,  // Command::text, as "x3B00". From this role on, ranges are sizes
   text,
   text2,
-  list,  // Command::text, with all values that follow
+  list,  // Command::text: this value and all further values
 };
 constexpr bool is_text(ValueRole role) { return role >= ValueRole::bytes; }
 
@@ -56,7 +56,7 @@ enum class CommandValue : std::uint8_t {
 struct ValueRow {
   constexpr ValueRow(CommandValue of, ValueRole in, std::int32_t least, std::int32_t most)
       : value(of), role(in), min(least), max(most) {}
-  // An optional value: the member is `none` if the value is left out.
+  // An optional value. `none`: the value of the member if the value is omitted.
   constexpr ValueRow(CommandValue of, ValueRole in, std::int32_t least, std::int32_t most,
                      std::int32_t none)
       : value(of), role(in), optional(true), min(least), max(most), missing(none) {}
@@ -65,7 +65,7 @@ struct ValueRow {
   ValueRole role;
   bool optional = false;
   std::int32_t min;
-  std::int32_t max;  // of a channel: CommandRow::channels
+  std::int32_t max;  // for a channel: CommandRow::channels
   std::int32_t missing = 0;
 };
 
@@ -97,14 +97,14 @@ struct CommandRow {
   constexpr const CommandValue* begin() const { return values; }
   constexpr const CommandValue* end() const { return values + most; }
 
-  Text word;  // the first value, if the letter alone does not name the kind: "STOP"
+  Text word;  // the first value, "STOP", if the kind needs one beside the letter
   CommandKind kind;
   char letter;
   CommandEffect effect;
   std::uint8_t channels;   // 0: none
   std::uint8_t least = 0;  // number of values, without the word
   std::uint8_t most = 0;
-  CommandValue values[5] = {};  // those after the word; at most one is optional
+  CommandValue values[5] = {};  // after the word; at most one is optional
 };
 
 namespace short_names {
@@ -124,7 +124,6 @@ constexpr const CommandRow& row_of(CommandKind kind) {
   return command_rows[static_cast<std::size_t>(kind)];
 }
 
-// True if a value fits into its member of Command.
 constexpr bool fits(const ValueRow& value) {
   switch (value.role) {
     case ValueRole::direction:
@@ -158,7 +157,7 @@ static_assert(has_values_that_fit(),
               "a value fits into its member; one may be left out; a list is the last");
 static_assert(encoder_channels == stepper_channels, "Z sets both");
 
-// A bit mask of the kinds with at least this effect, so that no table is needed at run time.
+// A bit mask of the kinds with at least this effect: no table is needed at run time.
 constexpr std::uint32_t kinds_that_move(CommandEffect least) {
   std::uint32_t kinds = 0;
   for (const CommandRow& row : command_rows) {
@@ -166,17 +165,16 @@ constexpr std::uint32_t kinds_that_move(CommandEffect least) {
   }
   return kinds;
 }
-// True if the command may be part of a group.
 constexpr bool joins_groups(CommandKind kind) {
   constexpr std::uint32_t kinds = kinds_that_move(CommandEffect::output);
   return (kinds >> static_cast<unsigned>(kind) & 1U) != 0;
 }
-// True if the command may move an output or a device. Such commands are refused in the safe state.
+// True if the command may move an output or a device: it is refused in the safe state.
 constexpr bool drives_output(CommandKind kind) {
   constexpr std::uint32_t kinds = kinds_that_move(CommandEffect::device);
   return (kinds >> static_cast<unsigned>(kind) & 1U) != 0;
 }
-// True if an answer of its own (`I`) confirms the command, and no control is needed.
+// True if an identity (`I`) confirms the command, which needs no control.
 constexpr bool is_question(CommandKind kind) {
   return kind == CommandKind::identify || kind == CommandKind::ask_wiring;
 }

@@ -12,20 +12,20 @@
 
 namespace r4 {
 
-// From `network` on: settings of the place where the board stands.
+// From `network` on: settings that a board accepts only over its own cable.
 enum class Setting : std::uint8_t {
 #define R4_SETTING(setting, ...) setting,
 #include "board.def"
 };
 
 struct SettingRow {
-  Text key;  // if there are several keys, the first
+  Text key;  // the first of several keys
   Setting setting;
   std::uint8_t keys;  // number of keys
-  // Range of a number; of a text, its bytes. Both 0: a word.
+  // Range of a number, or of a text's size in bytes. Both 0: a word.
   std::uint32_t min;
   std::uint32_t max;
-  std::uint32_t standard;  // the default of a number; of another setting, `off` or its first word
+  std::uint32_t standard;  // the default of a number; other settings: `off` or the first word
 };
 
 constexpr SettingRow setting_rows[] = {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields (docs/reference/protocol.md), from board.def: for each field its kind and
-// channel, for each kind the form, units and State member of its values.
+// The state fields (docs/reference/protocol.md), from board.def. A field has a kind and a channel.
+// A kind has the form, the units and the State member of its values.
 //
 //     for (const StateFieldRow& row : state_fields) …   in the order of the wire
 //     state_field(FieldKind::osmc, 2)                   StateField::osmc2
 //     numbers_of(state, StateField::osmc2)[0]           its duty cycle, 0-4095
 //     kind_row_of(StateField::osmc2).values[0].unit     "0-4095"
 //
-// A program that reads these only at compile time, as the firmware, carries no texts.
+// A program that reads these tables only at compile time, such as the firmware, contains no texts.
 #pragma once
 
 #include <cstddef>
@@ -43,7 +43,7 @@ enum class FieldForm : std::uint8_t {
   u32,     // uint32
   reason,  // SafeReason
   fault,   // ChipFault: chip,trouble
-  // of devices on the user's bus and UARTs (docs/how-to/devices.md)
+  // devices on the user's bus and UARTs (docs/how-to/devices.md)
   reading,  // I2cReading
   answer,   // I2cAnswer
   bus,      // I2cBusReport
@@ -54,7 +54,7 @@ struct StateFieldRow {
   Text name;  // on the wire
   StateField field;
   FieldKind kind;
-  std::uint8_t channel;  // from 1; of a kind with one field it is 1
+  std::uint8_t channel;  // from 1; 1 for a kind with one field
 };
 
 constexpr StateFieldRow state_fields[] = {
@@ -64,7 +64,7 @@ constexpr StateFieldRow state_fields[] = {
 };
 
 struct FieldValue {
-  const char* name;  // "pwm"; "" if the field has one value only
+  const char* name;  // "pwm"; "" if the field has only one value
   const char* unit;  // "V"; without a unit the range: "0-4095"
 };
 constexpr int most_field_values = 3;
@@ -73,12 +73,12 @@ struct FieldKindRow {
   const char* name;  // "osmc"
   FieldKind kind;
   FieldForm form;
-  std::uint16_t place;                   // of channel 1 in State; channel n is n-1 sizes after it
+  std::uint16_t place;                   // of channel 1 in State; channel n is n-1 sizes later
   std::uint16_t size;                    // of the value of a channel in State
-  FieldValue values[most_field_values];  // unused ones have no unit
+  FieldValue values[most_field_values];  // unused values have no unit
   const char* help;                      // one sentence
 
-  // True if the last value is not a number but the bytes of a device: "x3b00".
+  // True if the last value is the bytes of a device, "x3b00".
   constexpr bool has_bytes() const {
     return form == FieldForm::reading || form == FieldForm::answer || form == FieldForm::uart;
   }
@@ -107,7 +107,7 @@ constexpr const StateFieldRow& row_of(StateField field) {
 constexpr const FieldKindRow& row_of(FieldKind kind) { return field_kinds[static_cast<int>(kind)]; }
 constexpr const FieldKindRow& kind_row_of(StateField field) { return row_of(row_of(field).kind); }
 
-// The kind of field that shows a command's setpoint; FieldKind::count if there is none.
+// The kind of field that shows a command's setpoint; FieldKind::count if no field shows it.
 constexpr FieldKind shown_by(CommandKind command) {
   switch (command) {
 #define R4_OUTPUT(kind, ...) \
@@ -123,19 +123,19 @@ constexpr FieldKind shown_by(CommandKind command) {
   }
 }
 
-// The field of a channel, from 1. StateField::count if there is none.
+// `channel`: from 1. StateField::count if there is no such channel.
 R4LINK_API StateField state_field(FieldKind kind, int channel);
 
 // The numbers of a field, in the order and units of its kind. For FieldForm::reading, answer and
-// uart: the first two values, because the bytes of a device are not numbers.
+// uart, only the first two values: the bytes of a device are not numbers.
 struct StateNumbers {
   int count;
   double values[most_field_values];
   double operator[](int i) const { return values[i]; }
 };
 R4LINK_API StateNumbers numbers_of(const State& state, StateField field);
-// Writes what numbers_of() reads, rounded to the field's type. `present` stays. False, with `state`
-// unchanged, for a number out of range, a wrong count, or bytes.
+// The inverse of numbers_of(), rounded to the field's type. `present` is unchanged. False, with
+// `state` unchanged, for a number out of range, a wrong count, or a field with bytes.
 R4LINK_API bool set_numbers(State& state, StateField field, const StateNumbers& numbers);
 
 }  // namespace r4

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Transports of your own, by calls that may block:
+// Transports of your own, with functions that may block:
 //
 //     auto radio = std::make_shared<Radio>();                              // an OwnTransport
 //     r4::Board board(r4::carrier_on(radio));
 //     auto bus = std::make_shared<Adapter>();                              // an OwnCanBus
 //     r4::Board other(r4::carrier_on(bus, {.node = 3}));
 //
-// open(), send() and close() are called on a thread of their own, so they may wait while the link
+// open(), send() and close() are called on a separate thread, so they may wait while the link
 // continues. A datagram that waits for 100 ms is dropped, unless it is a stop.
 //
-// An exception (std::exception) from a call takes the transport down: an event reports it, close()
-// is called, and then open() five times a second until it returns. An exception from the first
-// open() is thrown where the board is opened. Opening a board waits for the first open(), without
-// limit; the end of a link waits at most 1 s for these calls.
-// A class that must not have a thread of its own implements Carrier (carrier.hpp).
+// If a function throws a std::exception, the transport is down: an event reports it, close() is
+// called, and then open() five times a second until it succeeds. An exception from the first open()
+// is thrown where the board is opened. Opening a board waits for the first open(), without limit;
+// the end of a link waits at most 1 s for these functions. A class without a separate thread
+// implements Carrier (carrier.hpp).
 #pragma once
 
 #include <cstdint>
@@ -26,27 +26,26 @@
 
 namespace r4 {
 
-// Moves whole datagrams of at most max_datagram (1024) bytes, of any content.
+// Moves whole datagrams of at most max_datagram (1024) bytes with any content.
 class R4LINK_API OwnTransport {
  public:
-  // Passes on a received datagram. Any thread, any time. Never waits; does nothing after the next
-  // open() or the end of the link. Throws Error{usage} for more than max_datagram bytes.
+  // Call it for each received datagram, on any thread and at any time. Never waits. No effect after
+  // the next open() or the end of the link. Throws Error{usage} for more than max_datagram bytes.
   using Received = std::function<void(std::string_view datagram)>;
 
   virtual ~OwnTransport() = default;
-  // For people.
+  // The name for people.
   virtual std::string name() const = 0;
   virtual void open(Received received) = 0;
   virtual void send(std::string_view datagram) = 0;
   virtual void close() = 0;
 };
 
-// A CAN bus that the system does not know; the link does the rest of can:// on it
-// (docs/reference/can.md).
+// A CAN bus that the system does not offer. The link uses it as can:// (docs/reference/can.md).
 class R4LINK_API OwnCanBus {
  public:
-  // Passes on a received frame, as above; not remote frames or own frames. Throws Error{usage} for
-  // more than 8 bytes of data, or 64 with CAN FD.
+  // Call it for each received frame, as OwnTransport::Received, but not for remote frames and own
+  // frames. Throws Error{usage} for more than 8 bytes of data, or 64 with CAN FD.
   using Received =
       std::function<void(std::uint32_t id, bool extended, bool fd, std::string_view data)>;
 

@@ -6,8 +6,8 @@
 //     stepper 1 direction = D34 inverted   # with its option
 //     encoder 4 index = none               # not connected
 //
-// A file has a line for each signal, in any order. Errors are Error{data}: they name the line, the
-// signal, the reason and the fix. Words from a file are shown by printable() and cut short.
+// A file has a line for each signal, in any order. Errors are Error{data} with the line, the
+// signal, the reason and the fix. Words from a file are shown by printable() and shortened.
 #pragma once
 
 #include <cstddef>
@@ -38,7 +38,7 @@ R4LINK_API Problem problem_of(const Wiring& wiring, const WiringCheck& found);
 R4LINK_API std::string write_wiring(const Wiring& wiring);
 
 constexpr std::size_t max_wiring_text = 64 * 1024;  // bytes
-// Reads and checks such a text. `name` is that of the file, for errors.
+// Reads and checks the text of a file. `name`: the file's name, for errors.
 R4LINK_API Wiring read_wiring(std::string_view text, const std::string& name = "wiring");
 // Also throws Error{open} or Error{permission}.
 R4LINK_API Wiring load_wiring(const std::string& path);
