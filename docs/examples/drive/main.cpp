@@ -33,7 +33,7 @@ void print_state(const r4::State& state) {
 void drive(r4::Board& board) {
   board.on_link(print_link);
   board.on_state([last = r4::Drive{}](const r4::State& state) mutable {
-    if (state.osmc(1) == last) return;  // the state comes 100 times a second
+    if (state.osmc(1) == last) return;  // the board sends 100 states a second
     last = state.osmc(1);
     print_state(state);
   });
@@ -43,12 +43,12 @@ void drive(r4::Board& board) {
   std::printf("board %s, firmware %s, on %s\n", who.board_id.c_str(), who.firmware.c_str(),
               board.name().c_str());
 
-  // Asks for the count of encoder 1, which is on the motor's shaft.
+  // Encoder 1 is on the motor's shaft.
   board.fields("DEFAULT,ENC1");
   const std::int32_t from = board.next_state().encoder(1);
 
-  // This program must call feed() from here on. If it hangs for 300 ms, the heartbeats
-  // stop and the board switches its outputs off.
+  // If this program does not call feed() for 300 ms, the heartbeats stop and the board switches its
+  // outputs off.
   board.watchdog(300ms);
   // Closes relay 1, which gives the motors their supply. Before arm(), and again after a safe
   // state, relay 1 is open, and commands that drive an output are refused.

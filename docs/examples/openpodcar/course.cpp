@@ -12,12 +12,12 @@
 namespace {
 
 constexpr double search_step_m = 0.02;
-constexpr double search_ahead_m = 1.5;  // shorter than the way back to the eight's crossing
-constexpr double near_m = 0.05;         // distance at which the end is reached
+constexpr double search_ahead_m = 1.5;  // shorter than the course back to the eight's crossing
+constexpr double near_m = 0.05;         // nearer to the end, the vehicle has arrived
 constexpr double braking_m_s2 = 0.4;
 constexpr double slowest_m_s = 0.15;
 constexpr double turning_m =
-    2.5;  // radius, above the smallest possible one to leave steering for corrections
+    2.5;  // radius; above the smallest possible radius, so that the steering can correct
 constexpr double turning_step_rad = 0.05;
 
 }  // namespace

@@ -15,7 +15,7 @@ struct Waypoint {
 
 class Course {
  public:
-  // The course begins at the first waypoint. At least two waypoints.
+  // At least two waypoints. The course begins at the first waypoint.
   explicit Course(std::vector<Waypoint> waypoints, double lookahead_m = 1.5);
   // Bernoulli's lemniscate through the origin, `reach_m` to each side. Its curvature grows evenly
   // towards both ends, where the radius is a third of `reach_m`.
@@ -40,6 +40,6 @@ class Course {
   std::vector<Waypoint> waypoints_;
   std::vector<double> lengths_;  // from the start to each waypoint
   double lookahead_m_;
-  double way_m_ = 0;  // travelled along the course
+  double way_m_ = 0;  // distance travelled along the course
   bool finished_ = false;
 };

@@ -15,7 +15,7 @@ inline constexpr double podcar_cruise_m_s = 1.0;
 // The board goes safe if US 1 sees an obstacle. A board that restarts forgets this threshold.
 void guard_podcar(r4::Board& board);
 
-// Arms the board, then calls guard_podcar(). If the board restarts after that, it is disarmed and
+// Arms the board, then calls guard_podcar(). If the board restarts after arming, it is disarmed and
 // the loop does not begin. So the vehicle never drives without the guard. Throws r4::Error if the
 // board refuses.
 void arm_podcar(r4::Board& board);

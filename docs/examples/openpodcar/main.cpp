@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Drives an OpenPodcar along a course, while a person holds the dead-man's handle.
 //
-//     openpodcar [URL] [X,Y …]     metres from its place: x forward, y to the left. Without
+//     openpodcar [URL] [X,Y …]     metres from the start: x forward, y to the left. Without
 //                                  waypoints: a figure of eight. Without a URL: a simulated board
 //                                  and a model of the vehicle
 //
@@ -50,7 +50,7 @@ void say(double time_s, const Podcar& podcar, const Course& course) {
 
 // False if the user ends the program before the drive.
 bool wait_for_enter(const Course& course) {
-  tcflush(STDIN_FILENO, TCIFLUSH);  // earlier input is not an answer
+  tcflush(STDIN_FILENO, TCIFLUSH);  // earlier input must not begin the drive
   std::printf("hold the handle, and press Enter to drive %.1f m\n", course.length_m());
   int key = std::getchar();
   while (key != '\n' && key != EOF) key = std::getchar();
@@ -59,7 +59,7 @@ bool wait_for_enter(const Course& course) {
 
 int drive(r4::Board& board, Course& course, const r4::control::Pose& start) {
   board.wait_active();
-  guard_podcar(board);  // then an obstacle prevents arming
+  guard_podcar(board);  // before arm(): an obstacle prevents arming
   if (!wait_for_enter(course)) return 0;
   arm_podcar(board);
 
@@ -93,7 +93,7 @@ int main(int argc, char** argv) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};
     sigaction(signal, nullptr, &before);
-    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);  // nohup: stays ignored
+    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);  // as SIGHUP under nohup
   }
   try {
     std::string url;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Drives an OpenPodcar by ROS 2, while a person holds the dead-man's handle: by a joystick, by
-// cmd_vel, or to goals of RViz (pilot.hpp says which source drives). ROS itself need not be
-// installed.
+// cmd_vel, or to goals of RViz (pilot.hpp selects the source). ROS itself need not be installed.
 //
 //     openpodcar_ros2 [URL]     without a URL: a simulated board and a model of the vehicle
 //
-// The joystick's start button arms. After the end of a drive, press it again. Ctrl-C ends the
+// The joystick's start button arms, and arms again after the end of a drive. Ctrl-C ends the
 // program. Exit code: 0 ended, 2 usage, 3 refused, 4 no such transport or graph, 5 permission, 6
 // not supported.
 #include <chrono>
@@ -32,9 +31,8 @@ namespace {
 
 volatile std::sig_atomic_t ended = 0;
 
-// False if the program is ended before start is pressed. run_loop() ends when the board restarts,
-// so this function gets the first state after a restart. `restarts`: the known restarts of the
-// board.
+// False if the program ends before start is pressed. run_loop() ends when the board restarts, so
+// this function gets the first state after a restart. `restarts`: the known restarts of the board.
 bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics,
                     std::uint32_t& restarts) {
   r4::States states = board.states();
@@ -78,13 +76,13 @@ void run(r4::Board& board) {
   Podcar podcar;
   Pilot pilot;
   board.wait_active();
-  guard_podcar(board);  // then an obstacle prevents arming
+  guard_podcar(board);  // before arm(): an obstacle prevents arming
   std::puts("hold the handle, and press the joystick's start");
   std::uint32_t restarts = 0;
   while (wait_for_start(board, podcar, pilot, topics, restarts)) {
     try {
       drive(board, podcar, pilot, topics);
-    } catch (const r4::Error& error) {  // no answer of the board, or a refusal
+    } catch (const r4::Error& error) {  // the board did not answer, or refused
       board.stop_async();
       pilot.end(error.what());
     }
@@ -98,7 +96,7 @@ void run(r4::Board& board) {
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    // A signal that is ignored at the start, as SIGHUP under nohup, stays ignored.
+    // A signal that is ignored at the start stays ignored, as SIGHUP under nohup.
     if (std::signal(signal, [](int) { ended = 1; }) == SIG_IGN) std::signal(signal, SIG_IGN);
   }
   try {

@@ -33,16 +33,16 @@ class PodcarModel final : public r4::sim::RobotModel {
   void pass_millisecond(const r4::sim::ChipPins& pins, bool motors_have_supply,
                         Senses& senses) override;
 
-  // Not while another thread calls pass_millisecond().
+  // Must not run while another thread calls pass_millisecond().
   const PodcarPlace& place() const { return place_; }
   void put(const PodcarPlace& place) { place_ = place; }
-  // A wall across the x axis; only for a vehicle that drives along the x axis.
+  // A wall across the x axis, for a vehicle that drives along the x axis.
   void set_wall(double x_m) { wall_x_m_ = x_m; }
   double travelled_m() const { return travelled_m_; }
 
-  // The way to a standstill if the supply is cut.
+  // Braking distance if the supply is cut.
   static double braking_distance_m(double speed_m_s);
-  // The way to a standstill with supply and duty 0: the motor is shorted.
+  // Braking distance with supply and duty 0: the motor is shorted.
   static double coasting_distance_m(double speed_m_s);
 
  private:

@@ -24,7 +24,7 @@ void Pilot::on_joy(std::span<const float> axes, std::span<const std::int32_t> bu
     start_was_up_ = false;
   }
 
-  // A press is a change from up to down. A button that is down in the first message is not a press.
+  // A press is a change from up to down: a button that is down in the first message does not count.
   const bool started = is_down(map_.start) && start_was_up_ && now - heard_ <= joy_timeout;
   start_was_up_ = !is_down(map_.start);
   heard_ = now;

@@ -32,8 +32,8 @@
 #include "course.hpp"
 #include "podcar.hpp"
 
-// Indexes in sensor_msgs/Joy. These are for an Xbox pad with joy_node; `ros2 topic echo /joy` shows
-// yours.
+// Indexes in sensor_msgs/Joy, for an Xbox pad with joy_node. `ros2 topic echo /joy` shows the
+// indexes of your pad.
 struct JoyMap {
   std::size_t hold = 4;           // LB: the joystick drives while it is held
   std::size_t start = 7;          // Start
@@ -68,8 +68,7 @@ class Pilot {
   // The reason for refusing the goal; empty if the goal is accepted.
   std::string on_goal(const Waypoint& goal, const r4::control::Pose& from, Time now);
 
-  // Call it when the board is armed and the loop begins. Of the earlier messages only a stop
-  // counts.
+  // Call it when the board is armed and the loop begins. Of earlier messages only a stop counts.
   void begin(Time now);
   // The motion, within the limits of podcar_geometry. If there is none, stop at once; why() has the
   // reason.

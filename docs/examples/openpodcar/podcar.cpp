@@ -5,7 +5,7 @@
 
 namespace {
 
-constexpr double steering_tolerance_rad = 0.004;  // closer to the goal, the actuator rests
+constexpr double steering_tolerance_rad = 0.004;  // nearer to the goal, the actuator rests
 constexpr double standing_m_s = 0.02;
 constexpr double driven_rad = 0.05;  // farther away, the actuator has full duty
 constexpr double moved_rad = 0.02;

@@ -19,7 +19,7 @@
 #include <r4link/setpoints.hpp>
 #include <r4link/state.hpp>
 
-// A mobility scooter (Shoprider Traverso). Measure yours.
+// The sizes of a mobility scooter (Shoprider Traverso). Measure your vehicle.
 inline constexpr r4::control::Ackermann::Geometry podcar_geometry{
     .wheelbase_m = 1.05, .track_m = 0.55, .max_steering_rad = 0.5, .max_speed_m_s = 1.2};
 inline constexpr r4::control::WheelGeometry podcar_wheel{
@@ -28,7 +28,7 @@ inline constexpr r4::control::SteeringSensor::Calibration podcar_steering{
     .left_volts = 1, .left_rad = 0.5, .right_volts = 4, .right_rad = -0.5};
 inline constexpr const char* podcar_fields = "OSMC1,DHB1A,ENC1,AINSTEER,DMHSTA,US1";
 // If US 1 sees a nearer obstacle, the board goes safe. The distance covers the quarter of a second
-// until the sensor's next reading, and the way to a standstill.
+// until the sensor's next reading, and the braking distance.
 inline constexpr int podcar_clearance_cm = 150;
 
 // The fields and limits that run_loop() supervises.
@@ -46,9 +46,9 @@ class Podcar {
   bool sense(const r4::State& state);
   // The setpoints for this motion. Call it after sense().
   r4::Setpoints drive(const r4::control::Twist& wish, double dt_s);
-  // True if the vehicle does what drive() commanded. False if the steering does not follow for half
-  // a second, or if the vehicle is much too fast, as with an encoder that counts backwards: do not
-  // drive then.
+  // True if the vehicle follows drive(). False if the steering does not follow for half a second,
+  // or if the vehicle is much too fast, as with an encoder that counts backwards. Do not drive
+  // then.
   bool obeys() const;
 
   const r4::control::Pose& pose() const { return odometry_.pose(); }

@@ -20,8 +20,8 @@ namespace {
 
 using Time = Pilot::Time;
 
-// The messages that can wait while the board is armed: three seconds while no stick moves, and less
-// while one moves, because joy_node publishes each change. If there are more, the newest are kept.
+// At most this many messages wait while the board is armed, and the newest are kept: three seconds
+// while no stick moves, less while a stick moves, because joy_node publishes each change.
 constexpr int most_joys = 64;
 constexpr const char* this_computer =
     R"(<Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>)"
@@ -63,7 +63,7 @@ dds_entity_t made(dds_entity_t entity, const char* what) {
 struct Topic {
   const char* name;
   const dds_topic_descriptor_t* type;
-  const char* hash;  // RIHS01 of the type, which ROS compares since Iron (REP 2016)
+  const char* hash;  // RIHS01 of the type: ROS compares it from Iron on (REP 2016)
 };
 const Topic joy_topic{"rt/joy", &sensor_msgs_msg_dds__Joy__desc,
                       "0d356c79cad3401e35ffeb75a96a96e08be3ef896b8b83841d73e890989372c5"};
@@ -124,8 +124,8 @@ Topics::Topics() {
     const Qos qos = qos_of(topic, reliability, depth);
     return made(dds_create_reader(participant_, created(topic), qos.get(), nullptr), topic.name);
   };
-  // A lost message of /joy or /cmd_vel is not repeated, because a newer message follows. A goal is
-  // sent only once, so it must be reliable.
+  // /joy and /cmd_vel need no repetition, because a newer message follows. A goal is sent only
+  // once, so it must be reliable.
   joy_ = reader(joy_topic, DDS_RELIABILITY_BEST_EFFORT, most_joys);
   cmd_vel_ = reader(cmd_vel_topic, DDS_RELIABILITY_BEST_EFFORT, 1);
   goal_pose_ = reader(goal_pose_topic, DDS_RELIABILITY_RELIABLE, 1);

@@ -22,9 +22,9 @@ HOLD = 0.7  # s; the terminal repeats a held key, the first time after 0.5 s
 
 class Hand(Protocol):
     ended: bool  # the person ended the drive, or the device is disconnected
-    stop: bool  # an emergency stop is requested
+    stop: bool  # the person requests an emergency stop
 
-    def begin(self) -> None: ...  # the board is armed; of the earlier input only a stop counts
+    def begin(self) -> None: ...  # call it when the board is armed; of earlier input only a stop counts
 
     def wish(self) -> Wish: ...
 
@@ -85,7 +85,7 @@ class Gamepad:
         self._arm = [float(each) for each in ARM_REST]
         self._axes: dict[int, float] = {}
         self._held = False
-        self._dropped = False  # until the next SYN_REPORT
+        self._dropped = False  # True from SYN_DROPPED until the next SYN_REPORT
         self._last = time.monotonic()
         self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         self._ranges = {axis: self._range(axis) for axis in (self.ABS_X, self.ABS_Y, self.ABS_RX, self.ABS_RY,

@@ -12,7 +12,7 @@ import scout
 TIME_CONSTANT = 0.15  # s, of a wheel with its motor and its share of the mass
 FRICTION = 3.0  # m/s^2, of the gears, without a supply
 STEP = 0.001
-LONGEST = 0.02  # s, longest step: if a busy machine delays the thread, the robot stands still meanwhile
+LONGEST = 0.02  # s, longest step: if a busy machine delays the thread, the robot stands still during the delay
 METRES_A_COUNT = 2 * math.pi * scout.WHEEL_RADIUS / scout.COUNTS_A_TURN
 
 

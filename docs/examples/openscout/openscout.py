@@ -4,11 +4,11 @@
 
     openscout.py URL                                    w s a d drive, u j i k o l move the arm, space stops, q ends
     openscout.py URL --gamepad /dev/input/event5
-    openscout.py URL --course 2,0 2,1                   metres from its place: x forward, y to the left
+    openscout.py URL --course 2,0 2,1                   metres from the start: x forward, y to the left
     openscout.py URL --eight 1.5
 
-If URL is `model`, the program uses a simulated board in this process with a model of the robot. Exit code: 0 the end of
-the course or of the keys, 3 the robot stopped before, other codes as in r4.
+If URL is `model`, the program uses a simulated board in this process with a model of the robot. Exit code: 0 the course
+or the person's input ended, 3 the robot stopped before the end, other codes as in r4.
 """
 import argparse
 import contextlib

@@ -43,11 +43,11 @@ class Scout:
         self._wheels = [control.Wheel(n, COUNTS_A_TURN, WHEEL_RADIUS) for n in ENCODERS]
         # For each wheel: 1.2 m/s at full duty, tau 0.15 s (docs/how-to/control.md, Tuning).
         self._pids = [control.Pid(0.6, 4.0, feed_forward=0.5, rate=10) for _ in ENCODERS]
-        self.odometry = control.Odometry(turn_per_rad=0.02)  # because the wheels slip in a turn
+        self.odometry = control.Odometry(turn_per_rad=0.02)  # the wheels slip in a turn
 
     def sense(self, state: r4link.State) -> None:
         rolled = control.WheelSpeeds(*(wheel.advance(state) for wheel in self._wheels))
-        step = self._drive.twist(rolled)  # with distances instead of speeds: a distance and an angle
+        step = self._drive.twist(rolled)  # distances instead of speeds give a distance and an angle
         self.odometry.advance(step.forward, step.turn)
 
     @property

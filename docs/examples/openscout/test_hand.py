@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wishes that follow from the events of a gamepad and from keys."""
+"""The wishes from the events of a gamepad and from keys."""
 import os
 import pty
 import struct

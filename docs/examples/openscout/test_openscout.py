@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Two kinds of tests. On the model alone, in virtual time: how closely the robot follows a course. As a process with a
-simulated board and the model: the same courses, the keys, and the way to a standstill after a failure."""
+simulated board and the model: the same courses, the keys, and the braking distance after a failure."""
 import contextlib
 import math
 import os
@@ -31,7 +31,7 @@ PROGRAM = pathlib.Path(__file__).with_name('openscout.py')
 
 
 class Pins:
-    """The command of two states ago: models the delay of the link."""
+    """Delays each command by two states, as the link does."""
 
     def __init__(self):
         self._under_way = [(0.0,) * 4] * 2
@@ -141,14 +141,14 @@ def drive(arguments, course):
             return program.stdout.read(), program.returncode, worst, math.dist((model.x, model.y), course.end)
 
 
-# Short courses: long courses are tested above, in virtual time.
+# Short courses, because the tests in virtual time have the long courses.
 @pytest.mark.parametrize('arguments, places', [(('--eight', '0.7'), figure_of_eight(0.7)),
                                                (('--course', '0.5,0', '0.8,0.4'), [(0, 0), (0.5, 0), (0.8, 0.4)])],
                          ids=['eight', 'course'])
 def test_the_robot_keeps_its_course_with_a_simulated_board(arguments, places):
     for _ in range(3):
         told, code, worst, left = drive(arguments, Course(places, CRUISE))
-        if 'newest state' not in told:  # a busy machine delayed the states: try again
+        if 'newest state' not in told:  # else a busy machine delayed the states: repeat the drive
             break
     assert code == 0, told
     print(f'{worst:.3f} m beside it at most, {left:.3f} m from its end')
@@ -207,7 +207,7 @@ def test_the_robot_stops_within_braking_distance_and_one_timeout(happens, notice
                 assert program.wait(PATIENCE_S) == 3
                 why = program.stdout.read()
                 assert told in why, why
-    # On a busy machine the model may get a change of the pins up to 0.25 s late.
+    # On a busy machine a change of the pins may reach the model up to 0.25 s late.
     allowed = ScoutModel.braking_distance(1.1 * speed) + 1.1 * speed * (notice_s + 0.25)
     print(f'{rolled:.3f} m, of {allowed:.3f} m')
     assert rolled <= allowed

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport of your own: datagrams over one end of a socketpair() of type SOCK_SEQPACKET. The
-// driver of a radio has the other end.
+// A transport of your own: datagrams over one end of a socketpair() of type SOCK_SEQPACKET. A
+// radio's driver has the other end.
 #pragma once
 
 #include <sys/socket.h>
@@ -26,7 +26,7 @@ class SocketCarrier final : public r4::Carrier {
     opening_.reset();
     up_ = false;
     if (!reader_.joinable()) return;
-    ::shutdown(socket_, SHUT_RDWR);  // ends the reader's wait; the socket cannot be used afterwards
+    ::shutdown(socket_, SHUT_RDWR);  // ends the reader's wait; the socket is not usable afterwards
     reader_.join();
   }
   r4::SendResult send(std::string_view bytes, r4::Priority, r4::Peer) override {
@@ -71,6 +71,6 @@ class SocketCarrier final : public r4::Carrier {
   std::shared_ptr<int> opening_;  // null: closed
   bool up_ = false;
   r4::CarrierCounters counters_;
-  std::atomic<int> waiting_{0};  // datagrams on their way to the loop
+  std::atomic<int> waiting_{0};  // datagrams posted to the loop
   std::thread reader_;
 };

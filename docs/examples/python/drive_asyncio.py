@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same for asyncio. Usage: drive_asyncio.py URL"""
+"""Drives a motor and shows what it does, with asyncio. Usage: drive_asyncio.py URL"""
 import asyncio
 import sys
 

@@ -12,7 +12,7 @@ def patrol(url: str, turns: int = 1) -> None:
     with r4link.Board(url, fields='DEFAULT,US1') as board:
         board.wait_active()
         board.arm(timeout=3)  # no motor turns yet
-        board.watchdog(0.3)  # from here on, a hang of this program stops the robot
+        board.watchdog(0.3)  # a hang of this program stops the robot
         duty = DUTY
         board.osmc(1).set(duty, timeout=0.25)
         for state in board.states():

@@ -11,7 +11,7 @@ EMERGENCY_STOP = 0x010  # docs/reference/can.md: any content, obeyed by every bo
 
 @pytest.fixture(name='button')
 def a_stop_button(request):
-    """Sends the stop as a stop button with a CAN controller does, without R4 software."""
+    """Sends the stop as a stop button with a CAN controller, without R4 software."""
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as controller:
         controller.bind((request.config.getoption('--r4-interface'),))
         yield lambda: controller.send(struct.pack('=IB3x8s', EMERGENCY_STOP, 0, b''))

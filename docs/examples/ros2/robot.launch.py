@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A robot with two motors that obeys cmd_vel. Usage: ros2 launch robot.launch.py
 
-Without --arm, because a respawned process must not drive by itself. After a look at the robot, arm it:
+r4 ros2 has no --arm here, because a respawned process must not drive by itself. First look at the robot, then arm it:
 ros2 topic pub --once /robot/arm std_msgs/msg/Bool '{data: true}'
 """
 from launch import LaunchDescription

@@ -6,8 +6,8 @@
     python3 wheel_speeds.py
     ros2 topic pub --once /arm std_msgs/msg/Bool '{data: true}'
 
-The cycle is that of ros2_control: read, update, write, once for each state of the board (100 Hz). Without states there
-is no cycle and nothing is published, and r4 ros2 stops the motors at its deadline.
+The cycle is the cycle of ros2_control: read, update, write, once for each state of the board (100 Hz). Without states
+this node publishes nothing, and r4 ros2 stops the motors at its deadline.
 """
 import math
 import time
@@ -20,7 +20,7 @@ SIGNS = (1, -1)  # left, right: the right motor and its encoder are mounted the 
 
 
 class Wheel:
-    """Duty from the wanted speed, corrected by the error of the speed (PI)."""
+    """The duty for the wanted speed, corrected by the error of the speed (PI)."""
 
     P, I = 0.02, 0.1  # duty per rad/s of error; per rad/s during 1 s
 

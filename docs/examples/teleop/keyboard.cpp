@@ -24,7 +24,7 @@ std::optional<char> Keyboard::key(std::chrono::milliseconds at_most) {
   char keys[64];
   const ssize_t size = ::read(STDIN_FILENO, keys, sizeof keys);
   if (size > 0) {
-    // If a stop is among the waiting keys, it wins.
+    // A stop among the waiting keys has priority.
     for (ssize_t i = 0; i < size; ++i) {
       if (keys[i] == ' ') return ' ';
     }

@@ -9,15 +9,15 @@
 
 class Keyboard {
  public:
-  // Switches the terminal on standard input to single keys; a pipe or a file is read as it is.
+  // Switches a terminal on standard input to single keys. A pipe or a file needs no switch.
   Keyboard();
-  // Leaves the terminal as it was.
+  // Restores the terminal.
   ~Keyboard();
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;
 
-  // The newest key; waits at most this long. Empty if there is none, or if the input has ended:
-  // at_end().
+  // The newest key; waits at most this long. Empty if there is no key, or if the input has ended
+  // (at_end()).
   std::optional<char> key(std::chrono::milliseconds at_most);
   bool at_end() const { return at_end_; }
 

@@ -4,7 +4,7 @@
 //     teleop [URL]       sim: without a URL; udp://192.168.0.125, serial:auto …
 //
 //     e       arm: the motors get their supply; nothing moves yet
-//     c       clear a stop that came before this program began; nothing moves
+//     c       clear a stop from before this program began; nothing moves
 //     w s     forward, backward      a d     turn left, right        as long as the key is held
 //     space   emergency stop         q       stop and end            any other key: stand still
 //
@@ -40,7 +40,7 @@ struct Setpoint {
   double right = 0;
 };
 
-// The setpoint that the pressed keys ask for; none after the keys are released.
+// The setpoint of the pressed keys; none after the keys are released.
 class Hand {
  public:
   void press(char key, Clock::time_point now) {
@@ -145,7 +145,7 @@ void teleoperate(r4::Board& board, Keyboard& keyboard) {
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    // A signal that is ignored at the start, as SIGHUP under nohup, stays ignored.
+    // A signal that is ignored at the start stays ignored, as SIGHUP under nohup.
     if (std::signal(signal, [](int) { ended = 1; }) == SIG_IGN) std::signal(signal, SIG_IGN);
   }
   try {
