@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// main() of the test programs. Some tests set bounds to real time, because they test promises about
-// real time. A machine that stands still (such as a paused virtual machine) breaks all bounds. A
-// thread that only reads the clock detects this. A failure during a standstill proves nothing, so the
-// test is repeated; any other failure counts. integration/repeat.py has the same rule.
+// main() of the test programs. Some tests measure promises about real time. A standstill of the
+// machine (such as a paused virtual machine) breaks every bound. A thread that only reads the clock
+// detects a standstill. A failure during a standstill proves nothing, so the test is repeated. Any
+// other failure counts. integration/repeat.py has the same rule.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -22,7 +22,7 @@ constexpr milliseconds standstill{20};  // the precision of the promises
 constexpr int most_runs = 3;
 constexpr const char* run_variable = "R4_TEST_RUN";
 
-// Measures the longest time that this process was kept from running since begin().
+// Measures the longest time that this process could not run since begin().
 class Watch {
  public:
   ~Watch() {
@@ -49,7 +49,7 @@ class Watch {
   std::thread thread_{[this] { look(); }};
 };
 
-// Records which tests failed while the machine stood still, and whether any other test failed.
+// Records which tests failed during a standstill, and whether any other test failed.
 class Failures final : public testing::EmptyTestEventListener {
  public:
   std::string to_repeat;  // in the form of --gtest_filter

@@ -15,7 +15,7 @@ void add_one() {
   ++count_of_this_thread;
 }
 
-// nullptr if there is no memory.
+// Returns nullptr if there is no memory.
 void* allocate(std::size_t size) {
   add_one();
   return std::malloc(size == 0 ? 1 : size);
@@ -34,8 +34,8 @@ void* or_throw(void* memory) {
 
 }  // namespace
 
-// The array forms of the standard library call these operators, and so do its nothrow forms. But
-// the nothrow forms of the sanitizers do not, and their memory would be freed here.
+// The array forms of the standard library call these operators. A sanitizer's nothrow forms do not
+// call them, so the nothrow forms are also replaced.
 void* operator new(std::size_t size) { return or_throw(allocate(size)); }
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cost of a state datagram: the first line of the paper's capture, written and read. The
-// reference in the same run copies its bytes and computes its CRC.
+// The cost of writing and reading a state datagram, the first line of the paper's capture. The
+// reference in the same run copies the line's bytes and computes their CRC.
 #include <benchmark/benchmark.h>
 #include <libdeflate.h>
 
@@ -34,7 +34,7 @@ Text write_state(char* buffer, const State& state) {
   return writer.finish(state.pnum, state.t_ms);
 }
 
-// The line, hidden from the compiler's optimizer.
+// The line, opaque to the compiler's optimizer.
 Text opaque_line() {
   Text bytes = line;
   benchmark::DoNotOptimize(bytes);
@@ -83,7 +83,7 @@ void crc_fast(benchmark::State& bench) {
 }
 BENCHMARK(crc_fast);
 
-// The reference: each implementation must at least move the bytes and check their CRC.
+// The reference: each implementation must at least copy the bytes and check their CRC.
 void copy_and_crc(benchmark::State& bench) {
   char buffer[max_datagram];
   measure(bench, line.size(), [&] {

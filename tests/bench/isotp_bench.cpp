@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cost of ISO-TP: a datagram of 170 bytes split into 25 classic frames and joined again, in
-// memory. The reference in the same run copies its bytes into and out of the same frames.
+// The cost of ISO-TP, in memory: a datagram of 170 bytes is split into 25 classic frames and joined
+// again. The reference in the same run copies the bytes into and out of the same frames.
 #include <benchmark/benchmark.h>
 
 #include <cstdlib>
@@ -79,7 +79,6 @@ void isotp_cut_and_join(benchmark::State& bench) {
 }
 BENCHMARK(isotp_cut_and_join);
 
-// The reference.
 void isotp_copy(benchmark::State& bench) {
   Ends ends;
   measure(bench, datagram_size, [&] {

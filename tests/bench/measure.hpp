@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The common way to time a piece of work in r4_bench.
 #pragma once
 
 #include <benchmark/benchmark.h>

@@ -42,7 +42,7 @@ void unpack_datagram(benchmark::State& bench, Text datagram) {
 BENCHMARK_CAPTURE(unpack_datagram, state, line);
 BENCHMARK_CAPTURE(unpack_datagram, command, command);
 
-// The reference: each implementation must at least move the bytes.
+// The reference: each implementation must at least copy the bytes.
 void copy_datagram(benchmark::State& bench) {
   char buffer[max_datagram];
   measure(bench, line.size(), [&] {

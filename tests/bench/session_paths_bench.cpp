@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cost for a host of receiving states over two paths: one session that handles each state once,
-// compared with two sessions of one path each, which handle all states. The limit is 1.2 times the
-// cost for the same datagrams, and no heap.
+// The host's cost of receiving states over two paths: one session that handles each state once,
+// compared with two sessions of one path each. The limit is 1.2 times the cost for the same
+// datagrams, and no allocation.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -25,7 +25,7 @@ class Receiver final : test::DrivenSession::Handler {
     for (std::size_t path = 0; path < paths; ++path) {
       session_->on_transport(path, true, Time{0});
       session_->poll(now(0));
-      if (sid_.empty()) continue;  // a session asks nothing on its only path
+      if (sid_.empty()) continue;  // a session sends no question on its only path
       write("I:R4,0.1.0,board,udp;ASKED:" + std::to_string(asked_) + ";SID:" + sid_, 0, 0);
       receive(path, 0);
     }
@@ -34,7 +34,6 @@ class Receiver final : test::DrivenSession::Handler {
     receive(0, 0);
     session_->poll(now(0));
   }
-  // The state of this millisecond, on this path.
   void receive(std::size_t path, std::uint32_t ms) {
     session_->receive(path, {bytes_.data(), size_}, now(ms));
   }
@@ -74,7 +73,7 @@ const std::string fields =
     "AIN24:24.28;AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;"
     "OSMC1:400,1;STEP1POS:-100;SERVO1POS:2000;SAFE:0";
 
-// Each state comes twice: to two sessions, or over two paths to one session.
+// Each state is received twice: by two sessions, or over two paths by one session.
 template <class Receive>
 void both(benchmark::State& bench, Receiver& writer, Receive receive) {
   std::uint32_t ms = 0;

@@ -76,7 +76,7 @@ struct BoardBench {
   std::uint64_t longest_poll_us = 0;
 };
 
-// Every output has a value other than its safe one.
+// Outputs that all differ from their safe values.
 inline Outputs full() {
   Outputs outputs;
   for (int i = 0; i < 4; ++i) {

@@ -113,8 +113,7 @@ TEST(BoardHardware, MayBeMadeSafeWhileItIsBeingMadeSafe) {
   }
 }
 
-// As when a host repeats its stop: the second interrupt comes in the middle of the first
-// make_safe().
+// A host may repeat its stop: the second interrupt comes in the middle of the first make_safe().
 TEST(BoardHardware, MayBeMadeSafeAgainWhileAnInterruptMakesItSafe) {
   for (int at = 0; at < 7; ++at) {
     for (int again = 0; again < 14; ++again) {
@@ -344,8 +343,8 @@ TEST(BoardHardware, AHeldBusIsFreedAndEverythingIsSafeAtOnce) {
 }
 
 TEST(BoardHardware, DropsWaitingWritesIfAHeldBusInterruptsTheSafeState) {
-  // Most of the applied values still wait when the bus is held in the middle of make_safe() and
-  // cannot be freed. A moment later the bus is free again.
+  // Most of the applied values are waiting when the bus is held in the middle of make_safe() and
+  // cannot be freed. Later the bus is free again.
   for (int polls = 0; polls < 3; ++polls) {
     for (std::size_t after = 1; after <= 33; ++after) {
       Bench bench;
@@ -428,7 +427,7 @@ TEST(BoardFaults, OtherChipsGoSafeIfOneChipHoldsTheBus) {
     hardware.apply(test::full());
     run(10);
     line.holds = true;
-    hardware.make_safe();  // as the guard does while the loop hangs
+    hardware.make_safe();  // the guard calls make_safe() while the loop hangs
     const sim::ChipPins pins = board.pins();
     const sim::ChipPins safe = sim::ChipPins::safe();
     for (int i = 0; i < 4; ++i) {

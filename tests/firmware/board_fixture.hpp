@@ -38,8 +38,8 @@ class MemoryHal final : public firmware::Hal {
     return !inputs.fault.any();
   }
 
-  firmware::Outputs outputs;  // the outputs of the hardware
-  firmware::Inputs inputs;    // the inputs that the board will read
+  firmware::Outputs outputs;
+  firmware::Inputs inputs;  // the next inputs of the board
   int applied = 0;
   int made_safe = 0;
   bool broken = false;  // true: a fault cannot be cleared
@@ -71,8 +71,8 @@ class MemoryPort final : public firmware::Port {
   bool packed = false;
   bool cable = false;
   bool bus = false;
-  std::uint32_t held = 0;                // the peer of a path of the session
-  std::vector<std::uint32_t> also_held;  // the peers of its other paths
+  std::uint32_t held = 0;                // the peer of one path of the session
+  std::vector<std::uint32_t> also_held;  // the peers of the session's other paths
   const std::uint32_t* now_ms = nullptr;
   std::size_t limit = max_datagram;
   std::vector<Sent> sent;
@@ -102,8 +102,8 @@ class EventLog final : public firmware::Observer {
   }
 
   std::vector<std::string> states;
-  std::uint32_t state_ms = 0;  // time of the newest state
-  int outputs = 0;             // number of changes
+  std::uint32_t state_ms = 0;
+  int outputs = 0;  // number of changes
   std::vector<std::uint32_t> executed;
   std::vector<std::string> refused;
   std::vector<std::string> rejected;
@@ -143,7 +143,7 @@ class TestBoard {
     application->start(now_ms);
   }
 
-  // Advances the time, and calls poll() exactly when the board asked for it.
+  // Advances the time, and calls poll() exactly when it is due.
   void run(std::uint32_t ms) {
     for (std::uint32_t left = ms;;) {
       const std::uint32_t due = application->poll(now_ms);
@@ -154,7 +154,7 @@ class TestBoard {
     }
   }
 
-  // Receives fields, to which the right checksum is added, from a source.
+  // Receives fields from a source. Adds the right checksum.
   void receive(const std::string& fields, Source from = {}) { receive_raw(with_crc(fields), from); }
   void receive_raw(const std::string& bytes, Source from = {}) {
     application->receive(from.port, from.peer, bytes, now_ms);
@@ -188,7 +188,7 @@ class TestBoard {
   }
 
   // The T that a host on that port echoes: the T of the newest heartbeat. 0 before the first
-  // heartbeat, and if the newest says CONNECTING.
+  // heartbeat, and if the newest heartbeat reports CONNECTING.
   std::uint32_t newest_t(int port = 0) {
     for (const MemoryPort::Sent& sent : ports[port].sent) {
       Datagram datagram;
@@ -224,7 +224,6 @@ class TestBoard {
   std::int32_t newest_cause_ = 0;
 };
 
-// The state in a datagram of the board.
 inline State state_of(const Heard& heard) {
   Datagram datagram;
   State state;
@@ -256,7 +255,7 @@ class TestHost {
     board.receive("H:ROS2-R4;" + stamp_of(sid, pnum, t), at);
     return pnum++;
   }
-  // A heartbeat that echoes the board's newest heartbeat.
+  // Sends a heartbeat that echoes the board's newest heartbeat.
   std::uint32_t echo() {
     heard_ = board.newest_t(at.port);
     return heartbeat(heard_);
@@ -266,7 +265,7 @@ class TestHost {
     resend(field, pnum);
     return pnum++;
   }
-  // E:CLEAR with the cause that the board has reported.
+  // Sends E:CLEAR with the cause that the board has reported.
   std::uint32_t clear() { return command(clear_field()); }
   std::string clear_field() { return "E:CLEAR," + std::to_string(board.newest_cause()); }
   void resend(const std::string& field, std::uint32_t number) {
@@ -294,7 +293,6 @@ class TestHost {
   std::uint32_t heard_ = 0;
 };
 
-// A board with a host in control.
 struct BoardInControl : testing::Test {
   BoardInControl() {
     host.connect();

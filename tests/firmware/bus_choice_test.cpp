@@ -40,7 +40,7 @@ constexpr auto not_confirmed = ChipTrouble::not_confirmed;
 constexpr auto damaged = ChipTrouble::damaged;
 constexpr auto other_bus = ChipTrouble::other_bus;
 
-// The cases are for a wiring that names the first bus.
+// The wiring of these cases names the first bus.
 constexpr Case cases[] = {
     {"Alone", first, none, true, {0, none, true}},
     {"Both", first | second, none, true, {0, none, true}},

@@ -96,7 +96,7 @@ TEST(Executor, ChangesNothingWhenItRefuses) {
       {Command::setting("rate", "1001"), Refusal::range},
       {Command::setting("rate", "x"), Refusal::format},
       {Command::setting("nonsense", "1"), Refusal::unknown},
-      {Command::setting("heartbeat", "1000"), Refusal::range},  // not below the timeout
+      {Command::setting("heartbeat", "1000"), Refusal::range},  // must be less than the timeout
   };
   for (const auto& [command, refusal] : cases) {
     EXPECT_EQ(carry_out(command, setpoints), refusal) << static_cast<int>(command.kind);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The guard in the timer interrupt: the faults that it notices, when it does, and the effect on the
-// application.
+// The guard in the timer interrupt: the faults that it notices, when it notices them, and the
+// effect on the application.
 #include "firmware/guard.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using test::TestBoard;
 using test::TestHost;
 
 struct GuardTest : testing::Test {
-  // Ticks for `ms` milliseconds, in each of which the duties of `alive` check in. Returns the
+  // Ticks for `ms` milliseconds. In each millisecond the duties of `alive` check in. Returns the
   // number of ticks that returned true.
   int run(std::uint32_t ms, std::initializer_list<Guard::Duty> alive = {}) {
     int fed = 0;
@@ -42,13 +42,14 @@ TEST_F(GuardTest, FeedsTheWatchdogOnlyWhenEveryDutyHasCheckedIn) {
   const Guard::Duty wifi = guard.add_duty(1000);
   EXPECT_EQ(run(10, {loop, wifi}), 10);
   EXPECT_EQ(run(10, {loop}), 0);
-  EXPECT_EQ(run(10, {wifi}), 1);  // the loop checked in before
+  EXPECT_EQ(run(10, {wifi}), 1);  // the loop has checked in before
   EXPECT_EQ(run(10), 0);
 }
 
 TEST_F(GuardTest, FeedsTheWatchdogIfThereAreNoDuties) { EXPECT_EQ(run(3), 3); }
 
-// Outputs must not be live without a guard. A developer who adds too many duties sees it at once.
+// Outputs must not be live without a guard. A developer who adds too many duties notices it at
+// once.
 TEST_F(GuardTest, TooManyDutiesKeepOutputsSafeAndTheWatchdogUnfed) {
   for (int i = 0; i < Guard::max_duties; ++i) EXPECT_EQ(guard.add_duty(20), i);
   EXPECT_EQ(run(1, {0, 1, 2, 3, 4, 5, 6, 7}), 1);
@@ -103,7 +104,7 @@ TEST_F(GuardTest, MakesTheOutputsSafeAtTheDeadlineAndNotBefore) {
   EXPECT_EQ(hal.made_safe, 1);
   EXPECT_EQ(guard.take(), SafeReason::link);
   run(1000);
-  EXPECT_EQ(hal.made_safe, 1);  // exactly once
+  EXPECT_EQ(hal.made_safe, 1);
 }
 
 TEST_F(GuardTest, ADeadlineCanBePostponedOrCancelled) {
@@ -149,7 +150,7 @@ struct GuardedBoard : testing::Test {
     EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
     board.log.states.clear();
   }
-  // The timer runs on, but the loop hangs.
+  // The timer runs, but the loop hangs.
   void hang(std::uint32_t ms) {
     for (std::uint32_t i = 0; i < ms; ++i) guard().tick(++board.now_ms);
   }
@@ -207,14 +208,14 @@ TEST_F(GuardedBoard, ARepeatedStopHeardByAnInterruptIsNotANewCause) {
   host.echo();
   host.clear();
   EXPECT_EQ(board.reason(), SafeReason::none);
-  guard().stop();  // the next stop: its number is unknown until the loop reads it
+  guard().stop();  // the number of this stop is unknown until the loop reads it
   guard().tick(board.now_ms);
   board.run(1);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_FALSE(application.safe_report().has_stop);
 }
 
-// An interrupt hears stops whose datagrams are then lost, because a port had no room for them.
+// An interrupt detects stops whose datagrams are then lost, because a port has no room for them.
 class StopWithoutDatagram : public GuardedBoard {
  protected:
   void hear() {
@@ -294,7 +295,7 @@ TEST_F(GuardedBoard, OutputsStayOffAfterTheGuardTripsDuringACommand) {
   const int applied = hal.applied;
   say("O:100,1,1;PNum:2;T:5;");
   EXPECT_EQ(hal.outputs, firmware::Outputs());
-  EXPECT_EQ(hal.applied, applied);  // not for an instant
+  EXPECT_EQ(hal.applied, applied);  // the outputs do not change even briefly
   observer.trip = [] {};
   application.poll(++now_ms);
   EXPECT_EQ(application.reason(), SafeReason::link);

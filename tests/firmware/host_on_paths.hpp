@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host with several paths. Each path carries the same datagrams, some paths later than others.
+// A host with several paths. Each path carries the same datagrams, with its own delay.
 #pragma once
 
 #include <algorithm>
@@ -38,7 +38,6 @@ class HostOnPaths {
   }
   std::uint32_t command(const std::string& field) { return send(field, 1699276044383); }
 
-  // Takes control.
   void connect() {
     heartbeat();
     run(2);
@@ -53,7 +52,7 @@ class HostOnPaths {
       if (static_cast<std::int32_t>(board_.now_ms - next_heartbeat_ms_) >= 0) heartbeat();
     }
   }
-  // The newest T that arrived on a path which is not cut.
+  // The newest T that arrived on a path that is not cut.
   std::uint32_t echo() {
     std::uint32_t newest = 0;
     for (const Path& path : paths) {
@@ -64,9 +63,8 @@ class HostOnPaths {
 
   std::vector<Path> paths;
   std::uint32_t pnum = 12345;
-  std::string last;  // the last datagram sent
-  // Changes the fields before they are sent, for example signs them. By default they stay as they
-  // are.
+  std::string last;
+  // Changes the fields before they are sent, for example signs them.
   std::function<std::string(const std::string&)> seal = [](const std::string& fields) {
     return fields;
   };

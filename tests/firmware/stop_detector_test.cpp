@@ -14,7 +14,6 @@ namespace {
 
 using test::with_crc;
 
-// The number of stops that the detector finds in these bytes.
 int stops_in(StopDetector& detector, const std::string& bytes) {
   int stops = 0;
   for (const char byte : bytes) stops += detector.push(byte) ? 1 : 0;

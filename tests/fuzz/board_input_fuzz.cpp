@@ -2,19 +2,19 @@
 // Any datagrams, from any peer, at any time: the board does not crash, and changes no output
 // without a valid command.
 //
-// The input is lines. Each line is a control byte and a payload. Bits 0-1 of the control byte are
-// the peer, bit 2 is the port, bit 3 adds a checksum after the payload, and bits 4-6 are the time
-// that passes before the line. A payload that begins with '!' is an event around the board.
+// The input is lines. Each line is a control byte and a payload. The control byte: bits 0-1 are the
+// peer, and bit 2 is the port. Bit 3 adds a checksum after the payload. Bits 4-6 are the time that
+// passes before the line. A payload that begins with '!' is an event on the board.
 //
 // Other payloads have placeholders for the values that only a host with a session knows:
-//   $T  the T of the newest heartbeat that the peer heard
+//   $T  the T of the newest heartbeat that the peer received
 //   $S  the field of the peer's session, "SID:...;"
-//   $N  its next packet number; $L its last; $P its next as a paper host
+//   $N  the peer's next packet number; $L its last number; $P its next number as a paper host
 //   $A  a valid signature of the text before it
 //   $W  the newest LEASE that the peer received
 //
-// If the first payload is "!k", the board has a key. Then only a stop is executed without such a
-// signature, and an unsigned heartbeat does not keep the link alive.
+// If the first payload is "!k", the board has a key. Then only a stop is executed without a
+// signature ($A), and an unsigned heartbeat does not keep the link alive.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -120,7 +120,7 @@ class UserBus final : public firmware::UserI2cPort {
   unsigned sum_ = 0;
 };
 
-// A board with its surroundings, and with the knowledge of its hosts.
+// A board with its hardware, and the values that its hosts know.
 class World final : public firmware::Hal, public firmware::Observer {
  public:
   explicit World(bool keyed) : keyed_(keyed) {
@@ -133,7 +133,8 @@ class World final : public firmware::Hal, public firmware::Observer {
     for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
     board_ = std::make_unique<firmware::Application>(*this, config, this);
     for (int i = 0; i < ports; ++i) {
-      // A peer's SID is the same on both ports, so its other port is another path of the session.
+      // A peer's SID is the same on both ports, so the peer's other port is another path of the
+      // session.
       for (std::uint32_t peer = 0; peer < peers; ++peer) hosts_[i][peer].sid = peer + 1;
       ports_[i].world = this;
       ports_[i].number = i;
@@ -167,7 +168,7 @@ class World final : public firmware::Hal, public firmware::Observer {
   };
   struct Host {
     std::uint32_t board_t = 0;
-    std::uint32_t number = 1000;  // of a host with a SID
+    std::uint32_t number = 1000;  // for datagrams with a SID
     std::uint32_t paper_number = 0;
     SessionId sid = no_session;
     std::set<std::uint32_t> told;  // LEASE values
@@ -179,7 +180,6 @@ class World final : public firmware::Hal, public firmware::Observer {
   firmware::Application& board() { return *board_; }
   Host& host(Source source) { return hosts_[source.port][source.peer]; }
 
-  // firmware::Hal
   void apply(const Outputs& outputs) override {
     require(within_ranges(outputs));
     outputs_ = outputs;
@@ -189,7 +189,6 @@ class World final : public firmware::Hal, public firmware::Observer {
   void zero(int channel) override { require(channel >= 1 && channel <= stepper_channels); }
   bool clear_fault() override { return true; }
 
-  // firmware::Observer
   void on_state(std::uint32_t, BoardState, SafeReason) override {}
   void on_outputs(std::uint32_t, const Outputs& outputs) override { require(outputs == outputs_); }
   void on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) override {
@@ -232,8 +231,8 @@ class World final : public firmware::Hal, public firmware::Observer {
     ++sent_;
   }
 
-  // States may go to each path of the controlling host, to everyone on the ports without such a
-  // path, and for the time of a lease to a watcher that has echoed its LEASE.
+  // States may be sent to each path of the controlling host, and to everyone on the ports without
+  // such a path. During a lease they may also be sent to a watcher that has echoed its LEASE.
   bool may_get_states(int port, std::uint32_t peer) const {
     const BoardLink& link = board_->link();
     const Host& host = hosts_[port][peer];
@@ -255,8 +254,8 @@ class World final : public firmware::Hal, public firmware::Observer {
     watcher.watches_ms = now_ms_;
   }
 
-  // Time passes. The board is polled when it asks, but at most about nine times for a line, to keep
-  // fuzzing fast.
+  // Advances the time. The board is polled when it is due, but at most about nine times for a line,
+  // to keep fuzzing fast.
   void pass(std::uint32_t ms) {
     for (std::uint32_t left = ms; left != 0;) {
       const std::uint32_t due = std::max(board().poll(now_ms_), ms / 8);
@@ -289,7 +288,7 @@ class World final : public firmware::Hal, public firmware::Observer {
       case 'b':
         bus_.held = value % 2 != 0;
         break;
-      case 'j':  // the loop stands still: time passes, nothing is polled
+      case 'j':  // the loop does not run: time passes without a poll
         now_ms_ += static_cast<std::uint32_t>(value) * 20;
         return;
       default:
@@ -332,7 +331,7 @@ class World final : public firmware::Hal, public firmware::Observer {
         require(outputs_ == Outputs() && board().reason() == SafeReason::stop);
       } else {
         require(signed_ && board().link().is_session_of({from, datagram.session_id()}));
-        require(executed_ == datagram.command_count());  // the whole group, or none of it
+        require(executed_ == datagram.command_count());  // the whole group, or no command of it
         require(executed_ <= max_group);
         require(datagram.has_pnum() && board().link().last_executed() == executed_pnum_);
       }
@@ -340,14 +339,13 @@ class World final : public firmware::Hal, public firmware::Observer {
     check();
   }
 
-  // A command that was executed is not executed again.
   void receive_again(Source from, const std::string& bytes) {
     const Outputs before = outputs_;
     receive(from, bytes);
     require(executed_ == 0 && (outputs_ == before || outputs_ == Outputs()));
   }
 
-  // The conditions that hold at any moment.
+  // Checks the conditions that must always hold.
   void check() {
     if (board().state() != BoardState::active) require(outputs_ == Outputs());
     if (outputs_ == Outputs()) return;

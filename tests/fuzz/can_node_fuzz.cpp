@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The input of a CAN bus: any frames at any times, to the ends of a board and of a host, and to a
-// listener that surveys the bus. The two ends also send to each other, lose frames, time out and
-// cancel. The input is a list of actions.
+// listener that surveys the bus. The ends of board and host also send to each other, lose frames,
+// time out and cancel. The input is a list of actions.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -146,7 +146,7 @@ class End {
   std::vector<std::uint32_t> counters_;
 };
 
-// A listener that hears all frames and sends none.
+// Receives all frames and sends none.
 class Listener {
  public:
   Listener() {
@@ -287,7 +287,7 @@ class Fuzz {
     listener_.on_frame(frame, now_us_);
   }
 
-  // Moves frames between the two ends. Some frames get lost, or are offered but not taken.
+  // Moves frames between the two ends. Some frames are lost, or are offered but not accepted.
   void exchange(std::uint8_t action) {
     CanFrame frame;
     for (int i = 0; i < 40; ++i) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any file, read as a recording, a log of frames, a capture or an MCAP file: reading ends, does not
-// crash, and has the same result for any cut of the bytes. The records come back byte for byte from
-// the formats that hold all of a recording. The other formats are well-formed, and the summary of
-// `r4 info` counts the same records.
+// Any file, read as a recording, a log of frames, a capture or an MCAP file. Reading ends, does not
+// crash, and has the same result for any cut of the bytes. The formats that hold a whole recording
+// return its records byte for byte. The other formats are well-formed, and the summary of `r4 info`
+// counts the same records.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -123,7 +123,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 2, size - 2);
   const r4::Made whole = converted(bytes, from, r4::native, size);
   const r4::Made cut = converted(bytes, from, r4::native, 1 + data[1]);
-  // If damaged data are compressed, the pieces decide how much of them is read.
+  // If damaged data are compressed, the size of the pieces decides how much is read.
   r4::require(r4::is_zstd(bytes) || (whole.file == cut.file && whole.told == cut.told));
   if (whole.file.empty()) return 0;
   r4::comes_back(whole, "x.pcapng");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any bytes: a datagram that the protocol accepts reads equal after it was written again. The input
+// Any bytes: a datagram that the protocol accepts reads equal after it is written again. The input
 // is used unchanged, and as fields with the right checksum, so that the fuzzer need not find CRCs.
 #include <cstdint>
 #include <cstdlib>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Device descriptions: any text is refused with a reason, or it is a description that the board can
-// carry out and that decodes any bytes to numbers.
+// execute and that decodes any bytes to numbers.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>

@@ -2,10 +2,10 @@
 // Any frames at any times: a sender and a receiver with arbitrary options keep their promises. The
 // first bytes of the input are the options, the rest is a list of actions.
 //
-// If frames of the sender get lost but none is added, the receiver delivers a datagram that was
-// sent. There is one exception, because a sequence number has four bits: the receiver may join two
-// datagrams if it heard no frame across their border. With flow control on both sides there is no
-// such exception, unless flow control arrives when its sender has begun the next datagram.
+// If the sender's frames are lost and no frame is added, the receiver delivers only datagrams that
+// were sent. There is one exception, because a sequence number has four bits: the receiver may join
+// two datagrams if it received no frame across their border. With flow control on both sides, the
+// exception occurs only if flow control arrives when its sender has begun the next datagram.
 #include <cstdint>
 #include <cstring>
 #include <vector>
@@ -27,7 +27,8 @@ class Fuzz {
   explicit Fuzz(Input& input)
       : input_(input),
         capacity_(input.word() % 6000),
-        // On the heap and of exactly this size, so that a sanitizer finds an access beyond it.
+        // On the heap and of exactly this size, so that a sanitizer finds an access beyond the
+        // buffer.
         buffer_(capacity_),
         datagram_(input.word() % 6000),
         sender_(sender_options()),
@@ -135,8 +136,8 @@ class Fuzz {
     take(frame);
   }
 
-  // Moves frames between the two, or only offers them. A frame whose bit of `lost` is set gets
-  // lost.
+  // Moves frames between the two ends, or only offers the frames. A frame whose bit of `lost` is
+  // set is lost.
   void exchange(bool accepted, std::uint32_t lost) {
     CanFrame frame;
     for (int i = 0; i < 20; ++i) {
@@ -169,7 +170,7 @@ class Fuzz {
     accepted_us_ = now_us_;
   }
 
-  // The receiver hears a frame of the sender.
+  // The receiver gets a frame of the sender.
   void take_own(const CanFrame& frame) {
     const bool consecutive = frame.data[0] >> 4 == static_cast<int>(IsotpFrameType::consecutive);
     if (!consecutive) {
@@ -259,14 +260,14 @@ class Fuzz {
   std::uint32_t now_us_ = 0;
 
   std::uint8_t number_ = 0;        // number and bytes of the newest datagram
-  std::uint32_t size_ = 0;         // its size
+  std::uint32_t size_ = 0;         // size of the newest datagram
   bool any_foreign_ = false;       // a frame from neither end was received
   std::uint32_t accepted_ = 0;     // frames of the datagram on the bus so far
-  std::uint32_t accepted_us_ = 0;  // time of the newest of them
+  std::uint32_t accepted_us_ = 0;  // time of the newest accepted frame
   std::uint32_t gap_us_ = 0;       // STmin of the newest flow control
-  std::uint8_t heard_number_ = 0;  // number of the newest first or single frame heard
+  std::uint8_t heard_number_ = 0;  // number of the newest first or single frame received
   int next_ = 0;                   // sequence number of the next frame
-  bool in_order_ = false;          // the frames since then counted up from 1
+  bool in_order_ = false;          // since that first frame, the frames have counted up from 1
   bool flow_control_late_ = false;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Any text for a link: it is refused with a reason, or it is a valid URL, or it is a bad link
-// within its bounds. A bad link loses and delays datagrams as its text says, and invents none.
+// within its bounds. A bad link loses and delays datagrams as its text says, and adds none.
 #include <chrono>
 #include <cstdint>
 #include <string>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any bytes. As a packed datagram they are refused, or they unpack to a text of the grammar, which
-// comes back when it is packed again. As a datagram, and as fields with a checksum, they come back
-// byte for byte or are sent as text.
+// Any bytes, as a packed datagram: they are refused, or they unpack to a text of the grammar. Any
+// bytes, as a datagram or as fields with a checksum: they are sent as text, or they unpack
+// unchanged after packing.
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -24,7 +24,7 @@ void comes_back(Text datagram) {
   const std::size_t size = pack(datagram, bytes, sizeof bytes);
   if (size == 0) return;
   require(size < datagram.size() && is_packed(bytes[0]));
-  // On the heap and of exactly this size, so that a sanitizer finds an access beyond it.
+  // On the heap and of exactly this size, so that a sanitizer finds an access beyond the buffer.
   const std::string exact(reinterpret_cast<const char*>(bytes), size);
   std::string out(datagram.size(), '\0');
   const UnpackResult result =

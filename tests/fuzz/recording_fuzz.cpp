@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any file, read as a recording: reading ends, does not crash, and has the same result for any cut
-// of the bytes. A record that was read reads equal after it was written again. The replay gives the
+// Any file, read as a recording. Reading ends, does not crash, and has the same result for any cut
+// of the bytes. A record that was read reads equal after it is written again. The replay gives the
 // datagrams of the board.
 #include <sys/mman.h>
 #include <unistd.h>
@@ -43,11 +43,11 @@ class Lines final : public RecordingVisitor {
 
   std::string text;
   std::optional<Time> beginning;
-  std::vector<std::string> said;  // by the board of the first path, since the beginning
+  std::vector<std::string> said;  // datagrams of the board on the first path, since the beginning
 };
 
-// The text of the records and errors. If damaged data are compressed, the pieces decide how much of
-// them is read.
+// The text of the records and errors. If damaged data are compressed, the size of the pieces
+// decides how much is read.
 Lines told(std::string_view bytes, std::size_t piece) {
   Lines lines;
   try {
@@ -63,7 +63,7 @@ Lines told(std::string_view bytes, std::size_t piece) {
   return lines;
 }
 
-// A file with these bytes, which exists as long as the object.
+// A file with these bytes, removed with the object.
 class File {
  public:
   explicit File(std::string_view bytes) : file_(::memfd_create("recording", MFD_CLOEXEC)) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any message of ROS: a string of R4_Command and ~/send, or the numbers of the other topics. The
-// message is refused with a reason, or it gives commands that the board accepts and that may come
-// from a topic.
+// Any ROS message: a string of R4_Command and ~/send, or the numbers of the other topics. The
+// message is refused with a reason, or it gives commands that the board accepts and that a topic
+// may send.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -49,7 +49,7 @@ void read_string(std::string_view bytes) {
   } catch (const Error& error) {
     const Problem& problem = error.problem();
     require(problem.kind == ErrorKind::usage && !problem.reason.empty() && !problem.fix.empty());
-    // This text goes to /rosout.
+    // This text is published on /rosout.
     require(std::all_of(problem.thing.begin(), problem.thing.end(), is_ascii));
   }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Other programs connect to the holder of a shared transport. Any number of them come, send any
-// messages, read or do not read, and go. Only their stops reach the board, a watcher hears
-// everything, and a stop of a program that comes last is obeyed. The input is a list of actions.
+// Any number of programs connect to the holder of a shared transport, send any messages, read or do
+// not read, and disconnect. Only their stops reach the board. A watcher receives everything, and
+// the stop of the last program is obeyed. The input is a list of actions.
 #include <fmt/format.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -85,7 +85,7 @@ class Holder final : private ShareHolder::Owner {
 
   void end() {
     run();
-    run_until([] { return false; });  // the holder accepts the waiting programs one after the other
+    run_until([] { return false; });  // the holder accepts the waiting programs one after another
     if (given_away_) return;
     const int before = stops_;
     const FileDescriptor last = come(Kind::stop, stop);
@@ -119,8 +119,7 @@ class Holder final : private ShareHolder::Owner {
   static void say(const FileDescriptor& connection, Kind kind, std::string_view text) {
     if (connection) send_message(connection.get(), kind, text);
   }
-  // Runs one event after another until `done`, or until nothing happens for the time of ten
-  // arrivals.
+  // Runs events until `done`, or until nothing happens for the time of ten arrivals.
   template <class Done>
   void run_until(Done done) {
     for (std::size_t event = 0; event < 100 * most_connections && !done(); ++event) {
@@ -133,7 +132,6 @@ class Holder final : private ShareHolder::Owner {
     io.poll();
     require(holder_.served() <= ShareHolder::most_served_after_a_stop);
   }
-  // Reads all messages that the watcher received.
   void hear() {
     std::array<char, ShareMessage::max_size + 1> packet;
     while (true) {
@@ -153,7 +151,7 @@ class Holder final : private ShareHolder::Owner {
   const bool gives_way_;
   bool given_away_ = false;
   int stops_ = 0;
-  int told_ = 0;  // sent to the watcher and not yet heard
+  int told_ = 0;  // sent to the watcher and not yet received
   ShareHolder holder_{io, *this};
   FileDescriptor watcher_;
   std::vector<FileDescriptor> others_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Wiring files: any text is refused with a reason that a terminal can show, or it is a wiring
-// without a fault that is written and read again unchanged.
+// Wiring files: any text is refused with a reason that a terminal can show, or it is a valid wiring
+// that reads equal after it is written again.
 #include <cstddef>
 #include <cstdint>
 #include <string>

@@ -47,7 +47,7 @@ class GigaBench {
  public:
   using Send = std::function<void(const std::string&)>;
 
-  // A board that is wired so, and keeps that wiring.
+  // A board that has this wiring, also in its settings.
   explicit GigaBench(const Wiring& wired = plan_wiring()) : giga(wired) {
     hold_handle(true);
     giga.usb_open = true;
@@ -56,7 +56,7 @@ class GigaBench {
   }
   ~GigaBench() { system.reset(); }
 
-  // The settings that the next boot finds: these lines, and a wiring, so that the board drives.
+  // Stores the settings for the next boot: these lines, and a wiring, so that the board drives.
   void store(const std::string& lines) { store(lines, giga.chips.wiring); }
   void store(const std::string& lines, const Wiring& wiring) {
     char value[max_wiring_value];
@@ -106,7 +106,8 @@ class GigaBench {
       next += 100;
     }
   }
-  // Runs the board until `done`, and gives the firmware's threads time. True if that happened in time.
+  // Runs the board until `done`, and gives the firmware's threads time. True if `done` came in
+  // time.
   bool run_until(const std::function<bool()>& done) {
     for (int i = 0; i < 20000; ++i) {
       if (done()) return true;
@@ -171,7 +172,7 @@ class GigaBench {
   std::unique_ptr<giga::System> system;
   CanNode can_node{CanEnd::host, 1, false};
   std::vector<std::string> can_datagrams;
-  std::vector<CanFrame> can_raw;  // the frames that belong to no datagram
+  std::vector<CanFrame> can_raw;  // frames that belong to no datagram
 
  private:
   void on_can(const CanFrame& frame) {

@@ -78,7 +78,7 @@ TEST(GigaUsb, AHostThatStopsReadingDoesNotBlockTheLoop) {
   bench.run_ms(60, host, bench.usb());
   const std::vector<std::string> lines = bench.usb_lines();
   ASSERT_GT(lines.size(), 3U);
-  // The interrupted line ends first. After it, no old line is sent.
+  // The interrupted line ends first. After this line, no old line is sent.
   Datagram datagram;
   const std::string& second = lines[2];
   ASSERT_TRUE(read_datagram(Text(second.data(), second.size()), datagram)) << second;
@@ -577,8 +577,8 @@ class GigaWiring : public testing::TestWithParam<int> {
   bool pin(giga::Pin pin) { return bench_.giga.pin(pin.port, pin.number); }
   void command(const std::string& field) { bench_.usb()(host_.command(field)); }
   void run_ms(std::uint64_t ms) { bench_.run_ms(ms, host_, bench_.usb()); }
-  // Expects these values in the newest state: `value` in the field of this channel, 0 in those of
-  // the other channels.
+  // Expects `value` in the field of this channel of the newest state, and 0 in the fields of the
+  // other channels.
   void expect_state(const char* name, const char* suffix, int value) {
     const std::vector<std::string> lines = bench_.usb_lines();
     const auto state = std::find_if(lines.rbegin(), lines.rend(), [&](const std::string& line) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The data that cross between the loop and the threads.
+// The data that the loop and the threads exchange.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -67,7 +67,7 @@ TEST(DatagramRing, TransfersDatagramsBetweenThreadsWithoutLoss) {
       if (ring.put(note, Text(text))) {
         ++i;
       } else {
-        std::this_thread::yield();  // the test also works on one processor
+        std::this_thread::yield();  // the test must also work on one processor
       }
     }
   });
@@ -110,7 +110,6 @@ TEST(HandOver, GivesTheNewestValueOnceAndNeverAMixture) {
   EXPECT_FALSE(place.take(known, value));
 }
 
-// A valid datagram.
 const std::string hello = with_crc("H:ROS2-R4;");
 
 TEST(UdpLink, GivesTheNetworkThreadThePeerInControl) {

@@ -23,7 +23,8 @@ class GigaDevices : public testing::Test {
     bench.usb()(host.command(field));
     bench.run_ms(3);
   }
-  // Runs for `ms` and returns the number of states with the field `told`. The newest is in `state`.
+  // Runs for `ms` and returns the number of states with the field `told`. The newest state is in
+  // `state`.
   std::size_t states(std::uint64_t ms) {
     bench.usb_lines();
     bench.run_ms(ms, host, bench.usb());
@@ -185,8 +186,8 @@ TEST(UserUartTiming, IsWithin1Point5PercentAtEveryRateAndClock) {
 }
 
 // From the same commit: pins_arduino.h has SERIAL2_TX 18, SERIAL2_RX 19, SERIAL3_TX 16, SERIAL3_RX
-// 17; variant.cpp has D18 PD_5, D19 PD_6, D16 PH_13, D17 PI_9. By the data sheet, PD5 and PD6 are
-// USART2 with function 7, PH13 and PI9 are UART4 with function 8.
+// 17; variant.cpp has D18 PD_5, D19 PD_6, D16 PH_13, D17 PI_9. In the data sheet, PD5 and PD6 are
+// USART2 with function 7, and PH13 and PI9 are UART4 with function 8.
 TEST(GigaPins, TheUsersUartsAreTheCoresSerial2AndSerial3) {
   EXPECT_TRUE(giga::uart_tx_pins[0] == (giga::Pin{'D', 5}));
   EXPECT_TRUE(giga::uart_rx_pins[0] == (giga::Pin{'D', 6}));

@@ -91,7 +91,7 @@ void CanPeripheral::store(std::uint32_t base, std::uint32_t index, const CanFram
   }
 }
 
-// The filters' decision about a frame: 1 and 2 are FIFO 0 and 1, 0 means that no filter matches.
+// The filters' decision about a frame: 1 and 2 are FIFO 0 and 1; 0: no filter matches.
 std::uint32_t CanPeripheral::filter_result(const CanFrame& frame) const {
   if (frame.extended) {
     const std::uint32_t filters = can.XIDFC.value >> 16 & 0x7F;

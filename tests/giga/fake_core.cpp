@@ -29,8 +29,8 @@ namespace {
 using r4::fake::Giga;
 using r4::fake::giga;
 
-// A thread of the firmware. When it is stopped, it waits forever at its next sleep, or where it
-// hangs, and touches nothing more.
+// A thread of the firmware. A stopped thread waits forever at its next sleep, or where it hangs,
+// and accesses nothing.
 struct FakeThread {
   std::mutex mutex;
   std::condition_variable changed;
@@ -43,7 +43,6 @@ struct FakeThread {
     changed.notify_all();
     changed.wait(lock, [this] { return parked; });
   }
-  // Waits forever if the thread was stopped.
   void may_end() {
     std::unique_lock<std::mutex> lock(mutex);
     while (end) {

@@ -166,7 +166,7 @@ I2cPeripheral& Giga::at_bus(int bus) {
   return chips.wiring.at(SignalKind::chip_bus).number() == bus ? i2c : user_i2c;
 }
 
-// ADC1: ready as soon as it is on. A conversion has ended when the firmware looks again.
+// ADC1 is ready as soon as it is on. A conversion ends before the firmware reads its state.
 void Giga::connect_converter() {
   constexpr std::uint32_t on = 1U << 0;
   constexpr std::uint32_t convert = 1U << 2;
@@ -265,8 +265,8 @@ void Giga::interrupts_may_come() {
   run_pending();
 }
 
-// Runs the interrupts that the firmware has requested, by priority. An interrupt of higher priority
-// does not interrupt one of lower priority here.
+// Runs the interrupts that the firmware has requested, by priority. Here an interrupt does not
+// interrupt an interrupt of lower priority.
 void Giga::run_pending() {
   for (;;) {
     int next = -1;
@@ -287,7 +287,7 @@ void Giga::run_pending() {
 void Giga::pass_us(std::uint64_t us) {
   const std::uint64_t end = now_ns_ + us * us_ns;
   while (now_ns_ < end) {
-    constexpr std::uint64_t step_ns = 100000;  // a frame on the CAN bus
+    constexpr std::uint64_t step_ns = 100000;  // one frame on the CAN bus
     std::uint64_t next = std::min(end, now_ns_ + step_ns);
     if (!in_interrupt && primask == 0) {
       for (const Timer* timer : {&ticker, &step_timer}) {

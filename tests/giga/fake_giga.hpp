@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A Giga in virtual time: the registers of the microcontroller that the firmware uses, the hardware
-// behind them, and the functions of the core that the firmware calls. One Giga can exist at a time.
-// The firmware runs in the thread of the test, and its threads are real threads.
+// of these registers, and the functions of the core that the firmware calls. One Giga can exist at
+// a time. The firmware runs in the thread of the test, and its threads are real threads.
 //
 // Time passes when the firmware reads the clock (1 us each time), when the firmware rests, or when
-// the test lets time pass. Timers interrupt the running code unless interrupts are off, so an
-// interrupt can come in the middle of a transfer, as on the chip. A reset ends the action of
+// the test advances the time. Timers interrupt the running code unless interrupts are off, so an
+// interrupt can occur in the middle of a transfer, as on the chip. A reset ends the action of
 // reset_by().
 #pragma once
 
@@ -45,10 +45,10 @@ class I2cPeripheral {
   void refuse_after(int bytes) { refuse_after_ = bytes; }
   // The peripheral reports a false bus error after `bytes` more bytes (ES0430 2.15.2).
   void report_bus_error_after(int bytes) { bus_error_after_ = bytes; }
-  // After `bytes` more bytes, a disturbance looks like a STOP: the chips leave the transfer.
+  // After `bytes` more bytes, a disturbance looks like a STOP, so the chips end the transfer.
   void disturb_after(int bytes) { disturbed_after_ = bytes; }
   // Another device pulls SDA low after `bytes` more bytes, in each of `transfers` transfers. A chip
-  // that is cut off while it sends a byte holds SDA for nine clocks.
+  // that is interrupted while it sends a byte holds SDA for nine clocks.
   void lose_after(int bytes, int transfers) {
     lose_after_ = bytes;
     losses_ = transfers;
@@ -56,7 +56,7 @@ class I2cPeripheral {
   // The bytes on the wire, addresses included: {address << 1 | read, bytes…} for each START.
   std::vector<std::vector<std::uint8_t>> log;
 
-  // Connects to the registers, in the state after a reset.
+  // Connects the registers, in the state after a reset.
   void connect(I2C_TypeDef& registers, std::vector<sim::I2cChipModel*> chips,
                std::uint64_t clock_ns);
   bool sda_low() const { return sda_held_ > 0; }
@@ -86,7 +86,7 @@ class I2cPeripheral {
   std::uint32_t cr2_ = 0;
   std::uint32_t left_ = 0;
   std::uint32_t flags_ = 0;
-  std::optional<std::uint8_t> txdr_;  // waits for the byte on the wire to end
+  std::optional<std::uint8_t> txdr_;  // waits until the byte on the wire has ended
   std::uint8_t out_ = 0;
   std::uint8_t in_ = 0;
   std::vector<sim::I2cChipModel*> taking_part_;
@@ -102,16 +102,16 @@ class I2cPeripheral {
   int hold_clocks_ = 0;
 };
 
-// A USART between the firmware and a wire, by RM0399: FIFOs of 16 bytes, and the time of a byte on
-// the wire.
+// A USART between the firmware and a wire, by RM0399, with FIFOs of 16 bytes and the time of a byte
+// on the wire.
 class UartPeripheral {
  public:
   void connect(USART_TypeDef& registers);
-  // The peer sends these bytes from this moment on, at the baud rate of the board.
+  // The peer sends these bytes at the baud rate of the board.
   void say(const std::string& bytes);
-  // The peer sends bytes without end. One in four is damaged.
+  // The peer sends bytes without end. One byte in four is damaged.
   bool noise = false;
-  std::uint32_t said = 0;  // undamaged bytes so far, to the board
+  std::uint32_t said = 0;  // undamaged bytes sent to the board so far
   std::uint32_t damaged = 0;
   std::string sent;
   std::uint64_t byte_ns() const;
@@ -134,11 +134,11 @@ class UartPeripheral {
   bool overrun_ = false;
 };
 
-// The FDCAN controller and the bus behind it, by RM0399: 100 us a frame.
+// The FDCAN controller and its bus, by RM0399. A frame takes 100 us.
 class CanPeripheral {
  public:
   void connect();
-  // A frame from the bus. False if the filters rejected it.
+  // Delivers a frame from the bus. False if the filters rejected the frame.
   bool deliver(const CanFrame& frame);
   void pass(std::uint64_t now_ns);
 
@@ -146,8 +146,8 @@ class CanPeripheral {
   bool quiet = true;         // the bus allows the recovery from bus-off
   void go_bus_off();
   std::deque<CanFrame> sent;
-  int overtaken = 0;  // urgent frames sent before the waiting ones
-  // Called when a frame was sent.
+  int overtaken = 0;  // urgent frames that have overtaken waiting frames
+  // Called after a frame is sent.
   std::function<void(const CanFrame&)> on_sent;
 
  private:
@@ -156,7 +156,7 @@ class CanPeripheral {
   std::uint32_t filter_result(const CanFrame& frame) const;
 
   std::uint32_t pending_ = 0;
-  std::uint32_t put_ = 1;  // of the elements 1 … 8 of the queue
+  std::uint32_t put_ = 1;  // index of the elements 1 … 8 of the queue
   std::uint32_t get_ = 1;
   std::uint32_t fifo0_get_ = 0, fifo0_fill_ = 0, fifo1_get_ = 0, fifo1_fill_ = 0;
   std::uint64_t free_at_ns_ = 0;
@@ -186,8 +186,7 @@ class Giga {
   void at(std::uint64_t when_ns, std::function<void()> event) { events_.emplace(when_ns, event); }
 
   // --- resets
-  // True if `action` ended in a reset of the chip. The peripherals then have their state after a
-  // reset.
+  // True if `action` ended in a reset of the chip, which also resets the peripherals.
   bool reset_by(const std::function<void()>& action);
   // While false, the watchdog does not need to be fed.
   bool watchdog_runs = false;
@@ -196,13 +195,13 @@ class Giga {
 
   // --- the board, as it is wired
   sim::BoardChips chips;
-  I2cPeripheral i2c;         // of the bus with the chips
+  I2cPeripheral i2c;         // on the bus with the chips
   sim::UserDevices devices;  // on the user's I2C bus
   I2cPeripheral user_i2c;
   UartPeripheral uart[uart_channels];
   CanPeripheral can;
-  void set_pin(char port, int number, bool level);  // an input, from outside
-  bool pin(char port, int number);                  // an output
+  void set_pin(char port, int number, bool level);  // sets an input, from outside
+  bool pin(char port, int number);                  // level of an output
   int rises(char port, int number) const;           // rising edges so far
   std::map<int, unsigned short> analog;             // PinName to counts
   bool converter_hangs = false;                     // the registers of ADC1 do nothing
@@ -210,11 +209,11 @@ class Giga {
 
   // --- USB
   bool usb_open = false;
-  bool usb_configured = true;  // a computer has found the board
+  bool usb_configured = true;  // a host has found the board
   bool usb_endpoint_open() const;
-  // A program closes the port while a packet is under way: the core closes the endpoint as well.
+  // A program closes the port while a packet is being sent, so the core closes the endpoint too.
   void usb_close_under_way();
-  bool usb_flushed = false;  // true: the FIFO of the endpoint was flushed after that
+  bool usb_flushed = false;  // true: the FIFO of the endpoint was flushed after the close
   std::uint32_t usb_baud = 115200;
   bool usb_reads = true;  // the host's program reads
   std::string usb_host;   // bytes that the program has read and the test has not taken
@@ -226,7 +225,7 @@ class Giga {
   };
   std::vector<UsbPacket> usb_sent;  // by the board
 
-  // --- WiFi; for both threads
+  // --- WiFi, for both threads
   std::mutex mutex;
   std::string air = "lab";  // the name of the network in range
   std::string air_password = "correct horse";
@@ -239,7 +238,7 @@ class Giga {
   // --- flash
   bool has_partition = true;
   std::atomic<bool> flash_hangs{false};
-  bool flash_damaged = false;  // what is stored cannot be read
+  bool flash_damaged = false;  // stored data cannot be read
   std::uint64_t partition_size = 1024 * 1024;
   std::map<std::string, std::string> stored;
   int writes = 0;

@@ -104,8 +104,8 @@ void I2cPeripheral::cut_off_chips() {
 }
 
 // Moves the byte in TXDR to the wire, which makes room for the next byte (RM0399, chapter I2C,
-// "Master transmitter"). If the byte is refused, the next byte stays in TXDR until the peripheral
-// is off.
+// "Master transmitter"). If a chip refuses the byte, the next byte stays in TXDR until the
+// peripheral is off.
 void I2cPeripheral::shift() {
   out_ = *txdr_;
   txdr_.reset();

@@ -69,7 +69,7 @@ void UartPeripheral::say(const std::string& bytes) {
   to_say_.insert(to_say_.end(), bytes.begin(), bytes.end());
 }
 
-// Moves the bytes that came in or went out since the last call.
+// Moves the bytes received and sent since the last call.
 void UartPeripheral::pass() {
   if (!on() || registers_->BRR.value == 0) return;
   const std::uint64_t now_ns = giga().now_ns();

@@ -30,7 +30,7 @@ class Bus {
     took_us = now_us() - began_us_;
     return result;
   }
-  // Reads MODE1 of 0x40, which after power-up repeats the register for each byte.
+  // Reads MODE1 of 0x40. After power-up the chip repeats the register for each byte.
   I2cResult read(Bytes& in) {
     const std::uint8_t mode1 = 0x00;
     began_us_ = now_us();
@@ -39,7 +39,8 @@ class Bus {
     return result;
   }
   std::uint64_t now_us() const { return chip.now_ns() / 1000; }
-  // Writes four bytes to 0x40, with one interrupt after `at_us`. Empty if the write ended before.
+  // Writes four bytes to 0x40, with one interrupt after `at_us`. Empty if the write ended before
+  // the interrupt.
   std::optional<I2cResult> write_interrupted(std::uint64_t at_us,
                                              const std::function<void()>& interrupt) {
     return interrupted(at_us, interrupt, [&] { return write(0x40, {0x06, 0x00, 0x10, 0x00}); });
@@ -227,7 +228,7 @@ TEST(I2cController, AWriteWhoseChipLeftTheBusIsNotAcknowledged) {
   }
 }
 
-// A chip that was cut off within a byte holds SDA.
+// A chip that is interrupted within a byte holds SDA.
 TEST(I2cController, AReadThatLostTheBusIsRepeatedOnAFreeBus) {
   for (int after = 0; after < 5; ++after) {
     Bus bus;
@@ -268,7 +269,7 @@ TEST(I2cController, RepeatsATransferOnceAfterALostArbitration) {
 }
 
 // An interrupt at every microsecond of two attempts switches everything off. The second attempt
-// must not undo that.
+// must not undo the interrupt's write.
 TEST(I2cController, DoesNotRepeatATransferAfterAnInterruptUsedTheBus) {
   for (std::uint64_t at_us = 1;; ++at_us) {
     Bus bus;
@@ -284,7 +285,7 @@ TEST(I2cController, DoesNotRepeatATransferAfterAnInterruptUsedTheBus) {
   }
 }
 
-// Also while SDA is being freed for the second attempt.
+// The interrupt may also come while SDA is freed for the second attempt.
 TEST(I2cController, AReadThatWasTakenOverIsNotRepeated) {
   int taken_over = 0;
   for (std::uint64_t at_us = 1;; ++at_us) {

@@ -10,7 +10,7 @@ extern "C" std::uint32_t r4_giga_own_stack[1024];
 namespace r4::test {
 namespace {
 
-// The core's stack or ours. Frames of the handlers grow down to its lowest word.
+// The lowest word of our stack or the core's stack. The handlers' frames grow down to this word.
 std::uint32_t* lowest_word(bool own) { return own ? r4_giga_own_stack : __StackLimit; }
 
 class GigaStacks : public testing::TestWithParam<bool> {};
@@ -22,7 +22,7 @@ TEST_P(GigaStacks, AFullStackMakesTheBoardSafeWithinAMillisecond) {
   bench.drive(host, bench.usb());
   const std::uint64_t full_ns = bench.giga.now_ns();
   EXPECT_TRUE(bench.giga.reset_by([&] {
-    // The stack is full, but nothing below it is overwritten.
+    // The stack is full, but no word below it is overwritten.
     lowest_word(GetParam())[7] = 0x12345678;
     bench.run_ms(20);
   }));
@@ -56,8 +56,8 @@ INSTANTIATE_TEST_SUITE_P(Each, GigaStacks, testing::Bool());
 TEST(GigaStacksReport, ShowsThePeakUseOfEachStack) {
   GigaBench bench;
   bench.boot();
-  r4_giga_own_stack[924] = 0;  // a hundred words
-  __StackLimit[56] = 0;        // two hundred words
+  r4_giga_own_stack[924] = 0;  // a hundred words used
+  __StackLimit[56] = 0;        // two hundred words used
   EXPECT_TRUE(
       has_line(bench.report(), "Interrupt stacks: the core's 800 of 1024, ours 400 of 4096"));
 }

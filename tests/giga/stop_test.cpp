@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// E:STOP while the loop is busy: the interrupt or thread that receives it hears it, and the board
-// obeys at once.
+// E:STOP while the loop is busy: the interrupt or thread that receives a stop detects it, and the
+// board obeys at once.
 #include "bench.hpp"
 
 namespace r4::test {
@@ -17,7 +17,7 @@ class StopBench : public GigaBench {
     run_ms(20);
   }
 
-  // Commands that cause many writes to the chips in the next turns.
+  // Sends commands that cause many writes to the chips in the next turns.
   void drive_everything() {
     for (const char* command : {"O:4095,0,2", "D:4095,1,2", "S:2000,2", "B:4000,1,0,2", "R:3,On"}) {
       usb()(host.command(command));
@@ -106,7 +106,7 @@ TEST(GigaStop, AStopOverUsbOrByCanFrameWorksAtAnyMomentOfATurn) {
 }
 
 // The loop assembles a datagram from CAN frames, so its stop waits for the end of a turn. Our hosts
-// send the frame.
+// send a stop as a frame instead.
 TEST(GigaStop, AStopByCanDatagramWorksInTheNextTurn) {
   StopBench bench;
   std::uint64_t longest_us = 0;
@@ -146,7 +146,7 @@ TEST(GigaStop, AUsbStopWorksAfterAnotherProgramsUnfinishedLine) {
 }
 
 TEST(GigaStop, TheGuardMakesAHungLoopWithAFullUsbRingSafe) {
-  // The host keeps the bytes that the board cannot take. The guard notices that the loop hangs.
+  // The host keeps the bytes that the board cannot accept. The guard notices that the loop hangs.
   StopBench bench;
   for (int i = 0; i < 200; ++i) bench.giga.usb_send(std::string(64, 'x'));
   bench.giga.usb_send("\n" + with_crc("E:STOP;") + "\r\n");

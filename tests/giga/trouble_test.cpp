@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The firmware's reaction when it, its hardware or its supply fails, and the data that it keeps.
+// How the firmware reacts to faults of its own, of its hardware and of its supply, and which data
+// it keeps.
 #include "bench.hpp"
 #include "firmware/ports/giga/pins.hpp"
 #include "tests/giga/core/registers.hpp"
@@ -15,7 +16,7 @@ TEST(GigaWatchdog, IsFedByTheGuardAsLongAsTheLoopTurns) {
   EXPECT_GT(bench.giga.watchdog_feeds - feeds, 300);
 }
 
-// `turn` lets 1 ms pass on a board that fails to do one of its duties.
+// `turn` advances the time by 1 ms on a board that fails in one of its duties.
 template <class Turn>
 void expect_safe_soon_and_reset(GigaBench& bench, Turn turn) {
   std::uint64_t safe_after_ms = 0;
@@ -79,7 +80,7 @@ TEST(GigaWatchdog, TheReportCountsMissedDeadlinesOfTheLoop) {
   GigaBench bench;
   bench.boot();
   bench.run_ms(20);
-  bench.giga.pass_ms(50);  // without a turn
+  bench.giga.pass_ms(50);  // without a turn of the loop
   bench.run_ms(20);
   EXPECT_TRUE(has_line(bench.report(), "Deadlines missed: 2"));
   EXPECT_EQ(bench.reason(), SafeReason::none) << "two missed deadlines are forgiven";
@@ -231,7 +232,7 @@ TEST(GigaTimers, LateTicksInOneInterruptWakeTheLoopOnce) {
   bench.giga.primask = 1;
   bench.giga.pass_ms(40);
   bench.giga.primask = 0;
-  bench.giga.pass_us(100);  // 40 ticks at once; the core's queue holds 16
+  bench.giga.pass_us(100);  // 40 ticks at once, while the core's queue holds 16
   bench.run_ms(10);
   const std::uint64_t before_ms = bench.giga.now_ms();
   for (int i = 0; i < 10; ++i) bench.turn();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boards with any wiring, and boards whose wiring is not known.
+// Boards with any wiring, and boards with an unknown wiring.
 #include <algorithm>
 
 #include "bench.hpp"
@@ -149,7 +149,7 @@ TEST(GigaWiring, WithoutAnalogInputsTheConverterRestsAndAllRead0) {
   EXPECT_EQ(static_cast<std::uint32_t>(ADC1->CR), 0U);
 }
 
-// --- a wiring that is not known
+// --- an unknown wiring
 
 TEST(GigaWiringFault, ANewBoardWaitsForItsOwner) {
   GigaBench bench;
@@ -196,7 +196,7 @@ void expect_lost(GigaBench& bench) {
   bench.run_ms(100, host, bench.usb());
   EXPECT_EQ(bench.reason(), SafeReason::fault);
   sim::ChipPins outputs = bench.pins();
-  for (Bldc& channel : outputs.bldc) channel.brake = true;  // nobody knows their lines
+  for (Bldc& channel : outputs.bldc) channel.brake = true;  // their lines are unknown
   EXPECT_TRUE(outputs.is_safe());
   const giga::Pin step = giga::pin_of(plan_wiring().at(SignalKind::step));
   EXPECT_NE(r4_fake_gpio[step.port - 'A'].MODER.value >> (2 * step.number) & 3U, 1U)
@@ -244,7 +244,8 @@ TEST(GigaBuses, TheChipsMayBeAtTheSecondBusAndTheUsersDevicesAtTheFirst) {
   EXPECT_EQ(bench.reason(), SafeReason::none);
 }
 
-// The firmware believes the plan, but the chips are at the other bus, and their outputs are on.
+// The firmware has the wiring of the plan, but the chips are on the other bus and their outputs are
+// on.
 TEST(GigaBuses, ChipsAtTheOtherBusAreSwitchedOffThereAndTransfersAreRefused) {
   GigaBench bench(at_the_second_bus());
   bench.boot();

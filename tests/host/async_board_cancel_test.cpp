@@ -22,11 +22,10 @@ using namespace std::chrono_literals;
 
 const Command run_motor = Command::osmc(1, Pwm(358), Direction::forward);
 
-// A session that no board answers.
 struct AsyncBoardUnanswered : OnALoop {
   AsyncBoardUnanswered() { board.open(); }
 
-  // Calls `start` and lets the slot of its handler cancel the call. Returns the result.
+  // Calls `start`, and cancels the call through the slot of its handler. Returns the result.
   template <class Start>
   std::optional<CommandResult> cancelled(Start start) {
     std::optional<CommandResult> result;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An exception of a callback or handler of an AsyncBoard leaves io.run(); the board continues.
+// An exception of a callback or handler of an AsyncBoard leaves io.run(). The board continues.
 #include <gtest/gtest.h>
 
 #include <asio/io_context.hpp>
@@ -66,8 +66,8 @@ TEST_P(ThrownIn, PassesItsExceptionToTheLoopAndTheBoardContinues) {
   const int states_then = states;
   const int heartbeats_then = heartbeats;
   bool asked = false;
-  // Without its timer the session receives nothing after a while: only our next heartbeats keep the
-  // link alive.
+  // Only heartbeats keep the link alive, and the session sends heartbeats only while its timer
+  // runs.
   while (states < states_then + 20 || heartbeats < heartbeats_then + 3 || !asked) {
     ASSERT_NE(io.run_one_for(5s), 0U) << "no reception and no timer is pending";
     if (states < states_then + 10 || asked) continue;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program on a computer that sleeps. This test program replaces the boot clock, so that it can
-// set the clock forward.
+// A host whose machine sleeps. This test program replaces the boot clock, so that it can set the
+// clock forward.
 #include <gtest/gtest.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -51,7 +51,7 @@ TEST(SleepWatchTest, ReportsASleepThatIsLongerThanTheLimitOnce) {
 
 TEST(SleepWatchTest, DoesNotMistakeABusyProcessorForASleep) {
   SleepWatch watch;
-  const Time before = steady_time() - 5s;  // the steady clock was read 5 s before the boot clock
+  const Time before = steady_time() - 5s;  // the steady clock is read 5 s before the boot clock
   EXPECT_FALSE(watch.slept(before, 1s));
   slept_seconds += 2;
   EXPECT_TRUE(watch.slept(steady_time(), 1s));

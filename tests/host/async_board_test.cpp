@@ -39,7 +39,7 @@ struct AsyncBoardTest : testing::Test, OnALoop {
   AsyncBoard board{io, "sim:?seed=1", at_will()};
 };
 
-// A path on which another host is heard.
+// A path on which another host's datagrams are received.
 struct Overhearing final : IdleCarrier {
   void overhear(std::string_view bytes) { handler_->on_overheard(bytes); }
 };
@@ -63,7 +63,7 @@ struct Undrained final : WrappedCarrier {
   void on_drained() override {}
 };
 
-// Models a CAN bus: all hosts send from one place.
+// Models a CAN bus: all its hosts are one peer.
 struct Bus final : IdleCarrier {
   explicit Bus(std::vector<std::string>& all) : sent(all) {}
   SendResult send(std::string_view bytes, Priority, Peer) override {
@@ -332,7 +332,7 @@ TEST_P(DestroyedIn, MayDestroyTheBoard) {
   }
 }
 
-// The transport is up at once, and reports that inside open().
+// The transport comes up at once, and reports it inside open().
 TEST(AsyncBoardEnd, MayBeClosedOrDestroyedInAnEventOfOpen) {
   asio::io_context io;
   AsyncBoard closed(io, "sim:");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program that streams setpoints to a simulated board in real time: no motor may start by itself.
+// A program streams setpoints to a simulated board in real time. No motor may start by itself.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -34,7 +34,7 @@ class Stream {
     ended_ = true;
     thread_.join();
   }
-  // The result of the last of 100 more posts.
+  // The result of the last of 100 posts.
   PostResult::Value later() {
     const int last = turns_ + 100;
     for (int turns = turns_; turns < last; turns = turns_) turns_.wait(turns);
@@ -96,7 +96,7 @@ TEST(BoardArming, ArmsABoardThatIsStopped) {
 TEST(BoardArming, ArmDoesNotExecuteEarlierSetpoints) {
   Board board("sim:", at_will());
   board.wait_active();
-  board.osmc(1).set_pwm(500, Direction::forward);  // like a datagram that the network delayed
+  board.osmc(1).set_pwm(500, Direction::forward);  // as if the network had delayed the datagram
   EXPECT_EQ(driven(board), 500);
   board.arm();
   EXPECT_EQ(driven(board), 0);

@@ -26,7 +26,7 @@ using namespace std::chrono_literals;
 
 constexpr Direction forward = Direction::forward;
 
-// The time on the I2C bus at which each wheel begins to turn as wanted: the outputs of the chips
+// The time on the I2C bus at which each wheel begins to turn as `wanted`. The outputs of a chip
 // change at the end of a transfer.
 class Wheels final : public sim::I2cObserver {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::Board and r4::AsyncBoard over several paths, in real time: a board on UDP and a pty, and on
-// carriers in memory that are cut.
+// memory carriers that the test cuts.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -35,7 +35,7 @@ std::string temporary_path(const std::string& name) {
   return testing::TempDir() + "r4-" + name + std::to_string(::getpid());
 }
 
-// True if `done` becomes true within 5 s. Checks it after each state of the board.
+// True if `done` becomes true within 5 s. Checks `done` after each state of the board.
 template <class Done>
 [[nodiscard]] bool comes_true(Board& board, Done done) {
   const auto end = std::chrono::steady_clock::now() + 5s;
@@ -140,7 +140,7 @@ TEST(BoardPaths, ContinueIfALaterDeviceOfAPathIsInvalid) {
   EXPECT_EQ(board.link().carrying, 1);
 }
 
-// One end of a carrier in memory. The test can cut it, with or without an event.
+// One end of a memory carrier. The test can cut it, with or without an event.
 class Cuttable final : public WrappedCarrier {
  public:
   using WrappedCarrier::WrappedCarrier;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// If the system refuses a resource, the call that needed it throws an Error with that reason.
+// If the system refuses a resource, the call that needs the resource throws an Error with that
+// reason.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -21,7 +22,7 @@ namespace {
 
 const std::string a_board = "udp://127.0.0.1:9?listen=0";
 
-// The error of `action` in a thread to which the system refuses the call `refused`.
+// The error of `action` in a thread whose system call `refused` fails.
 std::string error_where(const RefusedCall& refused, const std::function<void()>& action) {
   std::string text = "none";
   in_a_thread_of_its_own([&] {

@@ -35,7 +35,7 @@ BoardOptions watching() {
 }
 
 struct BoardRoles : testing::TestWithParam<std::vector<std::string>>, OnALoop {
-  // The outcome of the call that `start(handler)` starts.
+  // Waits for the outcome of the call that `start(handler)` begins.
   template <class Start>
   Outcome end_of(Start start) {
     return result_of(start).outcome;
@@ -231,7 +231,7 @@ TEST(BoardRole, TakeControlNamesTheControllingProgramAndKeepsWatching) {
   EXPECT_EQ(problem_of([&] { watcher.release_control(); }).outcome, Outcome::closed);
 }
 
-// Commands of other threads may reach the loop during the change: then no motor turns, and the
+// Commands of other threads may reach the loop during the change. Then no motor turns, and the
 // program continues.
 TEST(BoardRole, MayBeChangedWhileOtherThreadsCommand) {
   BoardInAThread simulated("udp");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The order of states: which states wait, which are replaced, and gaps if every state is wanted.
+// The order of states: which states wait, which states are replaced, and gaps if the user wants
+// every state.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -91,7 +92,7 @@ TEST(BoardStates, AnExceptionOfOnWaitEndsTheWait) {
   EXPECT_THROW(states.take(60s), EnoughWaited);
 }
 
-// Compared with a deque, for any order of puts and takes.
+// Compares with a deque, for any order of puts and takes.
 TEST(BoardStates, ComeInOrderAndReportEachGapOnce) {
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
     std::mt19937 random(seed);

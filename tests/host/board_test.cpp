@@ -144,7 +144,7 @@ TEST_P(BoardOver, TheBoardIsSafeAndFreeWhenTheHostHasEnded) {
   BoardInAThread simulated(GetParam());
   for (int i = 0; i < 3; ++i) {
     Board board(simulated.url(), at_will());
-    board.setting("timeout", "10000");  // far longer than any wait below
+    board.setting("timeout", "10000");  // much longer than any wait below
     board.osmc(1).set_pwm(100, Direction::forward);
     board.close();
     bool safe = false;
@@ -158,7 +158,7 @@ TEST_P(BoardOver, TheBoardIsSafeAndFreeWhenTheHostHasEnded) {
 
 TEST(Board, ReportsARestartBeforeTheNewState) {
   BoardInAThread simulated("pty", "0.5 reboot\n");
-  std::vector<int> duties;  // of OSMC 1, in the order of the callbacks; -1 marks the restart
+  std::vector<int> duties;  // duties of OSMC 1, in the order of the callbacks; -1 marks the restart
   const First<std::vector<int>> four;
   Board board(simulated.url(), at_will());
   board.on_restart([&] { duties.push_back(-1); });
@@ -206,14 +206,14 @@ TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
   Board owner(simulated.url(), at_will());
   owner.wait_active();
   BoardOptions options = at_will();
-  options.session.stop_linger = 0ms;  // the owner clears the stop at once
+  options.session.stop_linger = 0ms;  // so that the owner can clear the stop at once
   Board other(simulated.url(), options);
   const Problem problem = problem_of([&] { other.osmc(1).set_pwm(1, Direction::forward, 300ms); });
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_TRUE(contains(problem.reason, "another host controls the board"));
   EXPECT_TRUE(other.link().causes.has(LinkCause::busy));
 
-  other.stop();  // any host may stop a board
+  other.stop();
   EXPECT_TRUE(hears_of(owner, SafeReason::stop));
   owner.send(Command::clear());
   owner.close();
@@ -222,7 +222,7 @@ TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
 
 TEST_F(DrivenBoard, PostsCommandsAndGroupsAndWaitsForStatesWithoutTheHeap) {
   board.osmc(1).set_pwm(1, Direction::forward);
-  board.identify();  // so that the session knows that the board executes groups
+  board.identify();  // the answer reports that the board executes groups
   int sent = 0;
   const std::uint64_t before = bench::allocations_of_this_thread();
   for (int i = 0; i < 20; ++i) {
@@ -422,7 +422,6 @@ TEST(Board, MayBeClosedTwiceAndRefusesLaterCalls) {
   EXPECT_NE(board.state().t_ms, 0U) << "the last state stays available";
 }
 
-// close() and the destructor.
 TEST(Board, CloseEndsAllWaitingCalls) {
   for (const bool destroyed : {false, true}) {
     auto board = std::make_unique<Board>("udp://127.0.0.1:9?listen=0", at_will());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The threads of r4::Board: calls while a transport delays the thread of the link, the notices of a
+// The threads of r4::Board: calls while a transport delays the link's thread, the notices of a
 // callback, and the board while a callback runs.
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -97,7 +97,7 @@ TEST(BoardName, IsNeverTornWhileTheTransportReopens) {
   const std::string path = "/tmp/r4-board-name-" + std::to_string(::getpid());
   auto simulated = std::make_unique<BoardInAThread>("pty:" + path);
   Board board("serial://" + path);
-  board.watchdog(1ms);  // is never fed, so that no wait ends
+  board.watchdog(1ms);  // never fed, so that no wait ends
   auto waiting =
       std::async(std::launch::async, [&] { return problem_of([&] { board.wait_active(60s); }); });
   ASSERT_EQ(waiting.wait_for(50ms), std::future_status::timeout);
@@ -326,7 +326,7 @@ TEST_F(HangingCallbacks, StopTheHeartbeatsUntilTheyReturn) {
 
 TEST(BoardCallbacks, ALateCallbackGetsTheNewestState) {
   Board board("sim:");
-  board.send("F:DEFAULT");  // no other news comes after this
+  board.send("F:DEFAULT");  // no other event comes after this command
   std::promise<void> late;
   const First<std::uint32_t> next;
   board.on_state([&, next, calls = 0](const State& state) mutable {
@@ -336,7 +336,7 @@ TEST(BoardCallbacks, ALateCallbackGetsTheNewestState) {
   });
   std::uint32_t newest = 0;
   for (int i = 0; i < 5; ++i) newest = board.next_state().t_ms;
-  // Waiting calls get a state before callbacks do. So when the next state has come, this state was
+  // Waiting calls get a state before callbacks do. So after the next state, this state has been
   // reported.
   board.next_state();
   late.set_value();
@@ -344,7 +344,7 @@ TEST(BoardCallbacks, ALateCallbackGetsTheNewestState) {
 }
 
 struct BoardLoop : DrivenBoard {
-  // The outcome of the call that `start(board, handler)` starts on the loop.
+  // Waits for the outcome of the call that `start(board, handler)` begins on the loop.
   template <class Start>
   std::future<Outcome> begin(Start start) {
     const auto ended = std::make_shared<std::promise<Outcome>>();

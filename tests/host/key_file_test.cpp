@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program reads its key from a file that only its owner can read.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -21,7 +21,6 @@
 namespace r4::test {
 namespace {
 
-// A simulated board at the other end of a socket.
 class BoardBehindASocket {
  public:
   BoardBehindASocket() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boards on transports of the program itself, whose calls may wait
+// Boards on transports that the program implements, whose calls may wait
 // (r4link/transports/own_transport.hpp).
 #include <gtest/gtest.h>
 
@@ -34,8 +34,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// One end of a transport in memory: the function that receives the datagrams of the other end, and
-// faults.
+// One end of a memory transport, with faults. Holds the function that receives the datagrams of the
+// other end.
 template <class Received>
 class End {
  public:
@@ -55,7 +55,7 @@ class End {
     const std::lock_guard lock(mutex_);
     if (received_) received_(parts...);
   }
-  // A reader may still deliver data after its transport was closed.
+  // A reader may deliver data after its transport has closed.
   template <class... Parts>
   void hand_over_late(Parts... parts) {
     const std::lock_guard lock(mutex_);
@@ -73,7 +73,7 @@ class End {
  private:
   std::mutex mutex_;
   Received received_;
-  Received closed_;  // of the opening that was closed last
+  Received closed_;  // receiver of the last opening that was closed
 };
 
 struct Modem final : OwnTransport, End<OwnTransport::Received> {
@@ -299,7 +299,7 @@ TEST(OwnTransports, ASendThatDoesNotReturnDoesNotBlockTheBoard) {
   board->wait_active();
   bench.here->hold = true;
   EXPECT_THROW(board->send("O:358,1,1", milliseconds(50)), Error);
-  board.reset();  // must return although send() still waits
+  board.reset();  // must return although send() is waiting
   bench.here->hold = false;
   bench.here->hold.notify_all();
 }

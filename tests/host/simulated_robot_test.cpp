@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Events on a simulated board while a program drives it, caused by the test of the program.
+// The test of a program causes events on a simulated board while the program drives the board.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -160,7 +160,8 @@ TEST(BadLink, LosesDuplicatesAndDamagesDatagramsOfAnyBoard) {
   EXPECT_GT(statistics.packets.lost, 3U);
   EXPECT_GT(statistics.packets.duplicate, 3U);
   EXPECT_GT(statistics.damaged, 1U);
-  // Repeated until it is confirmed. If all copies came too late, it is sent again, as the error says.
+  // The library repeats the command until it is confirmed. If all duplicates came too late, the
+  // test sends the command again, as the error says.
   for (Refusal refusal = Refusal::stale; refusal == Refusal::stale;) {
     try {
       board.osmc(1).set_pwm(358, Direction::forward, std::chrono::seconds{10});

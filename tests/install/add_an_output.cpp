@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives the winch of docs/design/contributing.md on the simulated board: add_an_output.py compiles this with
-// the edit of that page. Prints the faults.
+// Drives the winch of docs/design/contributing.md on the simulated board, and prints the faults.
+// add_an_output.py compiles this file with the edit of that page.
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -27,7 +27,6 @@ void expect(bool condition, const std::string& what) {
 
 std::string str(Text text) { return {text.data(), text.size()}; }
 
-// A simulated board with its host in the same program.
 class Host final : public firmware::Port {
  public:
   Host() : hardware_(model), application_(hardware_.hal(), firmware::Application::Config()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host program with several paths to its board, for host_on_paths.py. It sends one command after the other, and
-// reports every state, the end of every command and every change of its paths.
+// A host program with several paths to its board, for host_on_paths.py. It sends one command after
+// another. It reports every state, the end of every command and every change of its paths.
 //
 //     host_on_paths URL...                     ends when its input ends
 //
@@ -39,7 +39,7 @@ void print(const Json& object) {
   std::fflush(stdout);
 }
 
-// True until the other end of our input is closed.
+// True until the other end closes our input.
 bool wanted() {
   pollfd input{0, POLLIN, 0};
   return ::poll(&input, 1, 0) == 0;

@@ -63,7 +63,7 @@ class Joystick {
   dds_entity_t writer_ = 0;
 };
 
-// Repeats the press: on a slow machine the messages heard before it may be too old.
+// Repeats the press: on a slow machine the messages received before the press may be too old.
 bool press_start(Topics& topics, Pilot& pilot, Joystick& joystick) {
   const auto deadline = std::chrono::steady_clock::now() + 10s;
   while (pilot.mode() != Pilot::Mode::automatic && std::chrono::steady_clock::now() < deadline) {

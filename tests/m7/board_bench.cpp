@@ -52,8 +52,8 @@ std::size_t write_hello(const Mac& mac, std::uint8_t* frame) {
 
 }  // namespace
 
-// The board and the listener share one Ethernet chip, so both have the same MAC address. A frame
-// for the board's IP address goes to the board.
+// The board and the listener share one Ethernet chip, so both have the same MAC address. The board
+// gets the frames for its IP address.
 void Listener::start(UdpPort& board) {
   EXPECT(board.start() && chip_.start());
   hear_oneself();

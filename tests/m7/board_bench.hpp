@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor, for tests. Its drivers use chips on a bus in real time,
-// and interrupts come in the middle of its transfers. A host sends commands as lines of text, and a
+// The whole board on the processor, for tests. Its drivers use chips on a bus in real time, and
+// interrupts occur in the middle of its transfers. A host sends commands as lines of text, and a
 // listener receives the board's UDP datagrams.
 //
 // Timer 1 interrupts every 50 us. Each interrupt delivers five bytes of a line at 1 Mbit/s, and
@@ -26,7 +26,7 @@ constexpr std::uint16_t board_port = 2018;
 
 extern void (*on_step)();
 
-// Timer 1 interrupts as long as an object of this class lives.
+// Timer 1 interrupts while an object of this class exists.
 class Stepping {
  public:
   explicit Stepping(void (*handler)(), std::uint32_t first_us = step_us) {
@@ -45,19 +45,19 @@ inline std::uint32_t us_since(std::uint32_t ticks) {
   return (BoardClock::ticks() - ticks) / BoardClock::ticks_per_us;
 }
 
-// Receives the datagrams that the board sends over UDP. The listener sends one datagram first, so
-// that the board knows its address.
+// Receives the datagrams that the board sends over UDP. The listener sends one datagram first,
+// because the board needs its address.
 class Listener {
  public:
   void start(UdpPort& board);
   // Reads all datagrams that have arrived.
   void hear();
 
-  const State& state() const { return state_; }                       // the newest
-  std::uint32_t states() const { return states_; }                    // since forget()
-  std::uint32_t longest_step_ms() const { return longest_step_ms_; }  // of T
-  std::uint32_t lost() const { return lost_; }                        // by the packet numbers
-  std::uint32_t bad() const { return bad_; }  // datagrams that could not be read
+  const State& state() const { return state_; }                       // the newest state
+  std::uint32_t states() const { return states_; }                    // states since forget()
+  std::uint32_t longest_step_ms() const { return longest_step_ms_; }  // longest step of T
+  std::uint32_t lost() const { return lost_; }  // states lost, by the packet numbers
+  std::uint32_t bad() const { return bad_; }    // datagrams that could not be read
   void forget() { states_ = longest_step_ms_ = lost_ = bad_ = 0; }
 
  private:
@@ -130,7 +130,7 @@ class Bench final : public sim::I2cObserver {
     write_command(writer, command);
     send(writer);
   }
-  // Turns the loop for `ms`, and until the whole line has arrived.
+  // Runs the loop for `ms`, and until the whole line has arrived.
   void run_ms(std::uint32_t ms) {
     const std::uint32_t began = now_ms();
     while (now_ms() - began < ms || line_sent_ < line_size_) {
@@ -179,7 +179,7 @@ class Bench final : public sim::I2cObserver {
   BoardProgram& board() { return board_; }
   sim::BoardModel& model() { return board_.model(); }
   SafeReason reason() { return board_.application().reason(); }
-  // Starts to listen to what the board sends over UDP.
+  // Starts to receive the board's UDP datagrams.
   Listener& listen() {
     listener_.start(udp_);
     board_.turn();
@@ -210,7 +210,8 @@ class Bench final : public sim::I2cObserver {
   volatile std::uint32_t safe_ticks_ = 0;
 };
 
-// Replaces the only board by one that was just switched on, with its host. `bench` points to it.
+// Replaces the only board with a board that was just switched on, and its host. `bench` points to
+// the new board.
 Bench& new_board();
 extern Bench* bench;
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus on the processor: its readings are right, and the board does not wait for it.
+// The user's I2C bus on the processor: its readings are right, and the board does not wait for the
+// bus.
 #include <initializer_list>
 
 #include "board_bench.hpp"
@@ -10,7 +11,7 @@ using namespace r4;
 using namespace r4::m7;
 using Fault = sim::UserBusModel::Fault;
 
-// One device at 100 Hz with 14 bytes, and seven readings at 20 Hz.
+// One device with 14 bytes at 100 Hz, and seven readings at 20 Hz.
 void read_all(Bench& host) {
   host.execute(Command::i2c_write(0x68, "x6b00"));
   host.execute(Command::i2c_poll(1, 0x68, "x3b", 14, 10));
@@ -71,8 +72,7 @@ TEST(Devices, AreReadAndReportedWithTheirTime) {
   EXPECT(state.t_ms - state.raw.i2c[0].t_ms <= 13 && state.i2c_bus.errors == 0);
 }
 
-// Checks states, stop and silence with a free bus, a held bus and a bus with endless clock
-// stretching.
+// The bus is free, held, or stretches the clock endlessly.
 TEST(Devices, AHeldBusDoesNotDelayTheBoard) {
   Longest longest;
   for (const Fault fault : {Fault::none, Fault::held, Fault::stretched}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor, as a watcher sees it: its inputs, the interlocks that use these
-// inputs, and the highest rate of states.
+// The states of the whole board on the processor: its inputs, the interlocks that use these inputs,
+// and the highest rate of states.
 #include "board_bench.hpp"
 
 namespace {
@@ -14,7 +14,6 @@ std::int32_t turns_of(int channel) {
 }
 std::int32_t part_of(int channel) { return channel % 2 == 0 ? -7 * channel : 7 * channel; }
 
-// A board with a host in control, and the states that the board sends.
 struct Heard {
   Heard() : host(new_board()), steps(step_of_board), told(host.listen()) {
     host.heartbeat();
@@ -110,8 +109,8 @@ TEST(BoardState, AnObstacleAtAnySensorSwitchesEverythingOff) {
   }
 }
 
-// Measured by the board's clock and counters. An instruction takes 8 ns here, however busy this
-// computer is.
+// Measured by the board's clock and counters. An instruction takes 8 ns here, however busy the
+// machine is.
 TEST(BoardState, StreamsAt1000HzOverUdpWithNothingLostOrLeftOut) {
   Heard board;
   board.host.execute(Command::fields("DEFAULT,LATE"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor: interrupts come in the middle of its transfers.
+// The whole board on the processor, with interrupts in the middle of its transfers.
 #include "board_bench.hpp"
 
 namespace {
@@ -40,7 +40,7 @@ TEST(Board, EveryCommandReachesItsPins) {
 
 namespace {
 
-// The time at which the wheels, the four OSMC channels, change.
+// The times at which the wheels, the four OSMC channels, change.
 struct Wheels {
   std::uint32_t first_ticks = 0;
   std::uint32_t last_ticks = 0;
@@ -150,11 +150,11 @@ TEST(Board, TheTimerInterruptNoticesSilenceWhileTheLoopIsBusy) {
   const std::uint32_t silence_ms = host.now_ms() - fed_ms;
   on_target::say_number("ms of silence until safe, with a timeout of 200", silence_ms);
   EXPECT(host.safe() && silence_ms >= timeout_ms && silence_ms <= timeout_ms + 3);
-  // The first turn after the standstill takes 8 ms. After that the board knows that the line is
-  // empty.
+  // The first turn after the standstill takes 8 ms. After this turn the board has detected that the
+  // line is empty.
   host.run_ms(20);
   EXPECT(host.board().application().reason() == SafeReason::link);
-  // A paper host that comes back begins a new session.
+  // A paper host that reconnects begins a new session.
   host.heartbeat();
   host.run_ms(20);
   EXPECT(host.board().application().reason() == SafeReason::none && host.pins().relays == 0);

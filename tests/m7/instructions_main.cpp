@@ -24,24 +24,23 @@ namespace {
 using namespace r4;
 using namespace r4::m7;
 
-// Runs 2 * `turns` instructions and a small constant number of others.
+// Runs 2 * `turns` instructions and a small constant number of other instructions.
 __attribute__((noinline)) void loop(std::uint32_t turns) {
   asm volatile("1: subs %0, #1\n\tbne 1b" : "+r"(turns) : : "cc");
 }
 
-// Repetitions between two readings of the timer. Reading the timer also takes instructions, and the
-// repetitions make this share small.
+// Repetitions between two readings of the timer. Reading the timer also takes instructions. The
+// repetitions make their share small.
 constexpr std::uint32_t repetitions = 100;
 
 template <class Work>
 std::uint32_t ticks_of(Work&& work) {
-  work();  // the first call also does the work that is done only once
+  work();  // the first call includes one-time setup
   const std::uint32_t before = BoardClock::ticks();
   for (std::uint32_t i = 0; i < repetitions; ++i) work();
   return BoardClock::ticks() - before;
 }
 
-// Ticks of the timer in a million instructions.
 std::uint32_t ticks_per_million = 0;
 
 void calibrate() {
@@ -56,7 +55,7 @@ std::uint32_t instructions_of(Work&& work) {
   return static_cast<std::uint32_t>(ticks * 1000000 / ticks_per_million / repetitions);
 }
 
-// A port that accepts every datagram and discards it.
+// Accepts every datagram and discards it.
 class Sink final : public firmware::Port {
  public:
   void send(Text datagram, Priority, std::uint32_t) override { size_ = datagram.size(); }
@@ -80,8 +79,8 @@ class Hal final : public firmware::Hal {
   std::uint16_t pwm_ = 0;
 };
 
-// A bus with simulated chips until set_free(). After that every write succeeds and costs almost
-// nothing.
+// A bus with simulated chips until set_free(). After set_free(), every write succeeds and costs
+// almost nothing.
 class Bus final : public firmware::I2cBus {
  public:
   firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
@@ -124,7 +123,7 @@ Text written(const State& state, char* buffer) {
   return writer.finish(22, 79146);
 }
 
-// Signs the datagram; does nothing without a signer.
+// Signs the datagram if there is a signer.
 void sign(Signer* signer, DatagramWriter& writer) {
   if (signer != nullptr) signer->sign(writer, 1700000000000000, 1000);
 }
@@ -180,7 +179,7 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, Sess
   return done ? count : 0;
 }
 
-// The same with the drivers of all channels.
+// Like command_instructions(), with the drivers of all channels.
 std::uint32_t with_drivers() {
   static Bus bus;
   static sim::BoardModel around(1);
@@ -197,7 +196,7 @@ std::uint32_t with_drivers() {
   return count;
 }
 
-// A bus on which each transfer is done at the next call of progress().
+// A bus on which each transfer ends at the next call of progress().
 class UserWire final : public firmware::UserI2cPort {
  public:
   void begin(const firmware::UserTransfer& transfer) override {
@@ -214,7 +213,7 @@ class UserWire final : public firmware::UserI2cPort {
   std::uint32_t transfers = 0;
 };
 
-// One of eight readings of the user's bus; it takes two calls of poll().
+// Instructions for one of eight readings of the user's bus, which takes two calls of poll().
 std::uint32_t reading_instructions() {
   static UserWire wire;
   static firmware::UserI2c bus(wire);

@@ -16,8 +16,8 @@ IsotpChannel channel() {
   return channel;
 }
 
-// Moves frames between both ends until the transfer ends; drops frame `lost` (0: none). True if the
-// datagram arrived.
+// Moves frames between both ends until the transfer ends, without frame `lost` (0: none). True if
+// the datagram arrived.
 bool arrives(Text datagram, std::uint32_t lost) {
   IsotpSenderOptions sending;
   sending.channel = channel();

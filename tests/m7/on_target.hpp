@@ -12,7 +12,7 @@ namespace on_target {
 class Test {
  public:
   Test(const char* name, void (*body)());
-  // Runs all tests; returns the number of failed tests.
+  // Runs all tests. Returns the number of failed tests.
   static std::uint32_t run_all();
 
  private:
@@ -23,7 +23,6 @@ class Test {
 
 // Prints the failed condition and marks the running test as failed.
 void failed(const char* what, const char* file, std::uint32_t line);
-// Prints a number to the log.
 void say_number(const char* what, std::uint32_t number);
 
 }  // namespace on_target

@@ -37,7 +37,8 @@ __attribute__((noinline)) std::uint32_t overflow(std::uint32_t depth) {
   return depth == 0 ? 0 : overflow(depth + 1) + room[(depth + 1) % 64];
 }
 
-// Simulates handlers that fill their stack to its last word; the interrupt of the guard checks it.
+// Simulates handlers that fill their stack to its last word. The interrupt of the guard checks the
+// word.
 void fill_handler_stack() {
   Bench& board = new_board();
   *r4_handler_stack = 0;

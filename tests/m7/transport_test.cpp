@@ -45,8 +45,8 @@ struct End {
   }
 };
 
-// A datagram "H:R4" from 10.0.2.2:5000 to the board's port, as QEMU's network sends it: its UDP
-// checksum is 0 (none) here.
+// A datagram "H:R4" from 10.0.2.2:5000 to the board's port, as QEMU's network sends it. Its UDP
+// checksum is 0 (none).
 std::size_t question(std::uint8_t* frame) {
   static const std::uint8_t bytes[] = {
       0x52, 0,    0,    0,    0, 1,  0x52, 0, 0,  0,  0,    2,    8,  0,        // Ethernet
@@ -114,7 +114,7 @@ TEST(UdpFrames, ReceiveADatagramAndAnswerItsSender) {
   const UdpFrames::Arrival arrival = end.board.take(end.frame, size, end.reply);
   EXPECT(arrival.from == asker() && arrival.datagram == Text("H:R4"));
   EXPECT(end.board.write(arrival.from, "answer", end.frame) == UdpFrames::min_frame);
-  // The receiver of the answer finds both checksums right.
+  // The receiver of the answer checks both checksums.
   UdpFrames host(0x0A000202, 5000);
   const UdpFrames::Arrival heard = host.take(end.frame, UdpFrames::min_frame, end.reply);
   EXPECT(heard.datagram == Text("answer"));

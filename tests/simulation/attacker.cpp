@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t memory = 4096;
 
-// The fields of a datagram without the fields before its signature.
+// The fields of a datagram, without its checksum.
 std::string fields_of(const std::string& bytes) { return bytes.substr(0, bytes.find('^')); }
 std::string unsigned_fields_of(const std::string& bytes) {
   const std::string fields = fields_of(bytes);
@@ -46,8 +46,8 @@ const char* to_text(Attack::Kind kind) {
   return "?";
 }
 
-// Keeps only datagrams that need a signature. A board obeys a stop and answers a question without
-// one.
+// Keeps only datagrams that need a signature. A board obeys stops and answers questions without a
+// signature.
 void Attacker::keep(std::vector<Heard>& list, Origin from, std::string_view bytes) {
   Datagram datagram;
   if (!read_datagram(Text(bytes), datagram) || asks_to_stop(datagram)) return;
@@ -65,7 +65,7 @@ void Attacker::on_board(std::string_view bytes) {
   echo_ = is_connecting_heartbeat(datagram) ? "0" : fmt::format("{}", board_t_);
 }
 
-// With the next packet number of that host.
+// Has the next packet number of the host of `like`.
 std::string Attacker::own(const std::string& field, const Heard& like, Random& random) const {
   Datagram datagram;
   read_datagram(Text(like.bytes), datagram);
@@ -76,7 +76,7 @@ std::string Attacker::own(const std::string& field, const Heard& like, Random& r
 Attack Attacker::next(Random& random) {
   Attack attack;
   attack.kind = static_cast<Attack::Kind>(random.below(static_cast<int>(Attack::Kind::count)));
-  // Few stops: after a stop the schedule tests little.
+  // Stops are rare, because the schedule tests little after a stop.
   if (attack.kind == Attack::Kind::stop && !random.chance(0.05)) attack.kind = Attack::Kind::replay;
   const std::vector<Heard>& heard_of = attack.kind == Attack::Kind::replay ? received_ : sent_;
   if (heard_of.empty()) return attack;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An attacker on the network of a board with a key. It does not have the key. It hears all
-// datagrams in both directions, and sends the board datagrams from any address, whole and in time.
+// An attacker on the network of a board with a key. It does not have the key. It receives all
+// datagrams in both directions. It can send the board datagrams from any address, undamaged and in
+// time.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@
 
 namespace r4::simulation {
 
-// The host that sent a datagram, and when.
+// The host that sent a datagram, and the time.
 struct Origin {
   int host = -1;
   std::uint32_t incarnation = 0;
@@ -24,24 +25,24 @@ struct Attack {
   enum class Kind : std::uint8_t {
     replay,     // a datagram that the board received, perhaps just now
     change,     // a datagram of a host, with one digit changed
-    strip,      // … without its signature
+    strip,      // a datagram of a host, without its signature
     heartbeat,  // a heartbeat by the attacker, with the right echo
     command,    // a command by the attacker, unsigned or with a made-up signature
-    other_key,  // … signed with another key, at the highest counter
-    stop,       // E:STOP: the board obeys it
+    other_key,  // a command by the attacker, signed with another key, at the highest counter
+    stop,       // E:STOP, which the board obeys
     count,
   };
   Kind kind = Kind::replay;
-  std::string bytes;  // empty: the attacker knows nothing to send
-  int host = -1;      // whose address it takes; -1: its own address
-  Origin like;        // the datagram that it sends again, changed or not
+  std::string bytes;  // empty: the attacker has nothing to send
+  int host = -1;      // the host whose address it uses; -1: its own address
+  Origin like;        // the origin of the datagram that it repeats or changes
 };
 const char* to_text(Attack::Kind kind);
 
 class Attacker {
  public:
-  // The datagrams on the network: sent by a host; received by the board from a host; sent by the
-  // board.
+  // The datagrams on the network: sent by a host, received by the board from a host, and sent by
+  // the board.
   void on_sent(Origin from, std::string_view bytes) { keep(sent_, from, bytes); }
   void on_received(Origin from, std::string_view bytes) { keep(received_, from, bytes); }
   void on_board(std::string_view bytes);
@@ -58,7 +59,7 @@ class Attacker {
   // Only datagrams that need a signature.
   std::vector<Heard> sent_;
   std::vector<Heard> received_;
-  std::string nonce_;  // of the board; below: the T of its newest heartbeat
+  std::string nonce_;  // the board's nonce; below, the T of its newest heartbeat
   std::string echo_ = "0";
   std::uint32_t board_t_ = 0;
 };

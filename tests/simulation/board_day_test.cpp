@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A working day of one board in virtual time: the application and the chip drivers on the model of
-// the board, every millisecond of it, with a host that drives the board and an incident every few
-// minutes. The clock in milliseconds and the clock in microseconds both wrap during the day.
-// R4_DAY_HOURS sets its length (8 by default), and R4_SEED its incidents.
+// A working day of one board in virtual time, with the application and the chip drivers on the
+// model of the board. A host drives the board, and an incident occurs every few minutes. The clock
+// in milliseconds and the clock in microseconds both wrap during the day. R4_DAY_HOURS sets its
+// length (8 by default), and R4_SEED its incidents.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -85,9 +85,8 @@ class Day final : private firmware::Port {
     live(300);
     ASSERT_EQ(application_.state(), BoardState::active);
   }
-  // Commands outputs at random.
   void drive() {
-    command("R:1,On");  // the motors have supply
+    command("R:1,On");  // the motors get supply
     for (int i = 0; i < 8; ++i) {
       const int channel = static_cast<int>(random_.between(1, 4));
       const int pwm = static_cast<int>(random_.between(1, 4095));
@@ -108,7 +107,7 @@ class Day final : private firmware::Port {
     }
   }
 
-  // One incident and its end; then the board is driven again.
+  // One incident and its end. Then the host drives the board again.
   void suffer(Incident incident) {
     const SafeReason reason = reasons[static_cast<int>(incident)];
     drive();
@@ -116,7 +115,7 @@ class Day final : private firmware::Port {
     const Chip chip = static_cast<Chip>(random_.below(chip_count));
     begin(incident, chip);
     const std::uint64_t began_ms = passed_ms_;
-    do {  // the stop of a stepper shows one millisecond later
+    do {  // a stepper's stop shows one millisecond later
       pass_millisecond();
       ASSERT_LE(passed_ms_ - began_ms, limit_ms(incident) + 1) << static_cast<int>(incident);
     } while (!all_off());
@@ -160,8 +159,8 @@ class Day final : private firmware::Port {
 
   int incidents[static_cast<int>(Incident::count)] = {};
   std::uint64_t states = 0;
-  int wrong_states = 0;  // states that do not come 10 ms after their predecessor
-  int unsafe_ms = 0;     // outputs live while the board is not ACTIVE
+  int wrong_states = 0;  // states that do not arrive 10 ms after the previous state
+  int unsafe_ms = 0;     // outputs were live while the board was not ACTIVE
   std::uint64_t watched_ms = 0;
 
  private:
@@ -191,7 +190,6 @@ class Day final : private firmware::Port {
     }
   }
 
-  // The positions of the stepper motors.
   std::array<std::int32_t, stepper_channels> shafts() const {
     std::array<std::int32_t, stepper_channels> steps{};
     for (int i = 0; i < stepper_channels; ++i) steps[i] = board_.stepper_shaft(i + 1);
@@ -235,9 +233,9 @@ class Day final : private firmware::Port {
     hangs_ = false;
     ended_ms_ = passed_ms_;
   }
-  // True if every output that the board can still reach is off. A chip that does not answer keeps
-  // its outputs, and so do all chips on a held bus: the relay of the dead-man's handle and the
-  // emergency switch are there for that case.
+  // True if every output that the board can reach is off. A chip that does not answer keeps its
+  // outputs, and so do all chips on a held bus. For this case there are the relay of the dead-man's
+  // handle and the emergency switch.
   bool all_off() {
     sim::ChipPins pins = board_.pins();
     const sim::ChipPins safe = sim::ChipPins::safe();
@@ -299,7 +297,7 @@ class Day final : private firmware::Port {
   bool held_ = false;
   bool stand_ = true;  // no stepper has moved in the last millisecond
   std::uint64_t ended_ms_ =
-      0;  // of the last incident; the next try reaches a chip that answers again
+      0;  // end of the last incident; the next attempt reaches a chip that answers again
   Chip silent_ = Chip::count;
   std::uint32_t pnum_ = 7;
   std::uint32_t heard_t_ = 0;
@@ -322,7 +320,7 @@ TEST(BoardDay, EveryIncidentEndsSafeAndTheBoardDrivesAgain) {
   std::printf("%llu states in %llu ms, %d off the grid; %d incidents\n",
               static_cast<unsigned long long>(day.states),
               static_cast<unsigned long long>(day.passed_ms()), day.wrong_states, next);
-  // The grid of 10 ms may be missed once after each outage of the link or the loop.
+  // States may miss the grid of 10 ms once after each outage of the link or the loop.
   EXPECT_LE(day.wrong_states, 1 + day.incidents[static_cast<int>(Incident::silence)] +
                                   day.incidents[static_cast<int>(Incident::hang)]);
 }

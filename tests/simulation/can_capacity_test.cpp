@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The number of boards that one bus carries, on a bus that is exact to the bit.
+// The number of boards that one bus can carry, on a bus that is exact to the bit.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -48,8 +48,8 @@ TEST(CanCapacity, EightBoardsInPackedFormFitOneClassicBus) {
   }
 }
 
-// Ten times a second, everything that can be sent wants the bus at once: more than the bus carries
-// in one state period. Boards that lose the arbitration then skip a state.
+// Ten times a second, everything is sent at once, which is more than the bus carries in one state
+// period. Boards that lose the arbitration then skip a state.
 constexpr std::uint32_t replaced_in_step = 12;
 
 TEST(CanCapacity, EightBoardsFitWhenAllSendAtTheSameInstant) {
@@ -100,7 +100,7 @@ TEST(CanCapacity, EightBoardsInPlainFormFitAnFdBus) {
   expect_all_there(result);
 }
 
-// The fields that our host selects need a frame of 48 bytes, and with it more than 5 Mbit/s.
+// The fields that our host selects need a frame of 48 bytes, and so more than 5 Mbit/s.
 TEST(CanCapacity, EightBoardsAtAKilohertzFitAnFdBusInPackedForm) {
   BackboneOptions options;
   options.tx_dl = 64;
@@ -120,7 +120,7 @@ TEST(CanCapacity, EightBoardsAtAKilohertzFitAnFdBusInPackedForm) {
   }
 }
 
-// The controllers repeat damaged frames: that costs time, but no datagram.
+// The controllers repeat damaged frames, which costs time but no datagram.
 TEST(CanCapacity, OneDamagedFrameInAHundredLosesNothing) {
   BackboneOptions options;
   options.bus.corrupted = 0.01;
@@ -129,7 +129,7 @@ TEST(CanCapacity, OneDamagedFrameInAHundredLosesNothing) {
   expect_all_there(result);
 }
 
-// Frames that a listener misses are lost: a datagram of n frames arrives with probability 0.99^n.
+// Frames that a listener misses are lost. A datagram of n frames arrives with probability 0.99^n.
 TEST(CanCapacity, OneMissedFrameInAHundredLosesOnlyItsDatagrams) {
   BackboneOptions options;
   options.bus.missed = 0.01;

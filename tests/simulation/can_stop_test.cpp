@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How long an emergency stop takes on a bus that is exact to the bit. Eight boards work, each the
-// firmware's application on its CAN node. A host stops all of them with one frame.
+// How long an emergency stop takes on a bus that is exact to the bit. Eight boards run the
+// firmware's application on their CAN nodes. A host stops all boards with one frame.
 //
-// The host's controller either has a mailbox that only the stop uses, or it is a FIFO, in which the
-// stop comes after all frames that wait. A board's loop takes the frames that came, lets the
-// application do what is due, and fills its controller. It does so at least once a millisecond, at
-// its own times. It keeps one mailbox free of telemetry.
+// The host's controller has a mailbox that only the stop uses, or it is a FIFO. In a FIFO the stop
+// is sent after all waiting frames. A board's loop takes the received frames, calls the application
+// when it is due, and fills its controller. The loop runs at least once a millisecond, at its own
+// times. It keeps one mailbox free of telemetry.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -122,7 +122,7 @@ class StoppedBoard final : private firmware::Port {
   std::string state_;
 };
 
-// A host of all boards: heartbeats and commands to each, and the stop.
+// A host of all boards sends heartbeats and commands to each board, and the stop.
 class StoppingHost {
  public:
   StoppingHost(CanBusModel& bus, CanQueue queue) : bus_(bus) {
@@ -178,8 +178,8 @@ class StoppingHost {
     CanNode node;
     std::deque<std::string> waiting;
     std::uint32_t pnum = 12345;
-    std::uint64_t board_t = 0;  // of the board's newest heartbeat: our heartbeats echo it
-    std::int32_t cause = 0;     // of the same heartbeat
+    std::uint64_t board_t = 0;  // T of the board's newest heartbeat, which our heartbeats echo
+    std::int32_t cause = 0;     // cause in the same heartbeat
   };
 
   void heartbeats() {
@@ -207,7 +207,7 @@ class StoppingHost {
 
 using Boards = std::vector<std::unique_ptr<StoppedBoard>>;
 
-// Lets all boards drive again. A board obeys an E:CLEAR only if it names the newest stop that the
+// Makes all boards drive again. A board obeys an E:CLEAR only if it names the newest stop that the
 // board has reported. The report may be lost when all boards report their stop at once, so the
 // E:CLEAR is repeated.
 void drive(CanBusModel& bus, const Boards& boards, StoppingHost& host) {
@@ -226,8 +226,8 @@ void drive(CanBusModel& bus, const Boards& boards, StoppingHost& host) {
   }
 }
 
-// The stop is on the bus after at most `frames_before` frames, and every board is safe a
-// millisecond later.
+// The stop is sent after at most `frames_before` frames, and every board is safe a millisecond
+// later.
 void expect_stops(CanQueue queue, std::uint64_t frames_before) {
   constexpr int stops = 1000;
   CanBusModel bus({.rate = {1000000, 0}, .seed = 1});
@@ -282,7 +282,6 @@ void expect_stops(CanQueue queue, std::uint64_t frames_before) {
   EXPECT_LE(max_board_ns, ms_ns);
 }
 
-// The one frame is the frame in progress.
 TEST(CanStop, WaitsForAtMostOneFrameIfTheHostHasMailboxes) { expect_stops(CanQueue::mailboxes, 1); }
 
 TEST(CanStop, WaitsAlsoForTheFramesInAFifo) { expect_stops(CanQueue::fifo, 1 + mailboxes); }

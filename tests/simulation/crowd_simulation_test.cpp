@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board on a network where a crowd sends to it: up to 60 addresses, while a UDP port has 16
-// places for its peers. The host in control keeps control, whatever the crowd sends. After that
-// host has left, another host gets control. R4_CROWDS sets the number of crowds, R4_SEED replays
-// one crowd.
+// A crowd of up to 60 addresses sends to a board whose UDP port has 16 places for peers. The host
+// in control keeps control, whatever the crowd sends. After the host has left, another host gets
+// control. R4_CROWDS sets the number of crowds, and R4_SEED replays one crowd.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -32,12 +31,12 @@ constexpr std::uint64_t leaves_ms = 10'000;  // when the first host leaves
 constexpr std::uint64_t ends_ms = 30'000;
 
 struct CrowdReport {
-  std::string violation;  // empty: every promise held
+  std::string violation;  // empty: no promise was broken
   std::uint64_t hash = 0xcbf29ce484222325U;
   std::uint32_t strangers_sent = 0;
-  std::uint32_t renumbered = 0;  // hosts without control that got a new number because of the crowd
-  // The time until the host was in control. For the second host it counts from when that host had
-  // begun and the first host had left.
+  std::uint32_t renumbered = 0;  // hosts without control with another number because of the crowd
+  // The time until the host was in control. For the second host, the time begins when the second
+  // host has begun and the first host has left.
   std::uint32_t first_ms = 0;
   std::uint32_t second_ms = 0;
 };
@@ -59,7 +58,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
 
     Crowd& crowd;
     int address;
-    std::uint32_t number = 0;  // in the port's table
+    std::uint32_t number = 0;  // its number in the port's table
     std::unique_ptr<test::DrivenSession> session;
   };
   struct Packet {
@@ -68,18 +67,15 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
     std::string bytes;
   };
 
-  // firmware::Hal
   void apply(const firmware::Outputs& outputs) override { outputs_ = outputs; }
   void make_safe() override { outputs_ = firmware::Outputs(); }
   void sample(firmware::Inputs& inputs) override { inputs.handle = Handle::held; }
   void zero(int) override {}
   bool clear_fault() override { return true; }
-  // firmware::Port
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
   void hold(std::uint32_t peer) override { peers_.hold(peer); }
   void also_hold(std::uint32_t peer) override { peers_.also_hold(peer); }
-  // firmware::Observer
   void on_state(std::uint32_t, firmware::BoardState, SafeReason) override {}
   void on_outputs(std::uint32_t, const firmware::Outputs&) override {}
   void on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) override;
@@ -109,7 +105,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   bool with_key_;
   int strangers_;
   std::uint64_t per_second_;  // datagrams of the whole crowd
-  std::uint64_t burst_;       // … sent at once
+  std::uint64_t burst_;       // datagrams sent at once
   std::unique_ptr<firmware::Application> application_;
   firmware::Outputs outputs_;
   Peers peers_;
@@ -119,9 +115,9 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   std::deque<Packet> to_board_;
   std::deque<Packet> to_host_;
   std::string overheard_;  // a datagram of a host that the board received
-  int receiving_ = 0;      // the address of that datagram
+  int receiving_ = 0;      // the address that sent the datagram
   bool was_in_control_ = false;
-  std::uint64_t expected_ms_ = 0;  // until then, a command of the host in control must come
+  std::uint64_t expected_ms_ = 0;  // a command of the host in control must arrive before this time
 };
 
 Crowd::Crowd(std::uint64_t seed)
@@ -194,7 +190,7 @@ void Crowd::pass_millisecond() {
   check();
 }
 
-// Some datagrams one after the other, at this average rate per second.
+// Sends bursts, on average per_second_ datagrams a second.
 void Crowd::crowd_sends() {
   const double bursts = static_cast<double>(per_second_) / static_cast<double>(burst_) / 1000;
   const int most = static_cast<int>(bursts) + 1;
@@ -209,11 +205,11 @@ void Crowd::crowd_sends() {
   }
 }
 
-// Anything but a stop, because any program may ask for a stop. While a board without a key has no
-// controlling host, a heartbeat with a right echo would take control, so then the crowd knows no
-// right echo. In that time the crowd asks for control at most twice as often as the board answers.
-// Without a key, a program that hears the host's datagrams can pass for the host; in this test the
-// crowd hears none.
+// Returns any datagram but a stop, because any program may send a stop. While a board without a key
+// has no controlling host, a heartbeat with a right echo would take control. So the crowd must not
+// have a right echo then, and it requests control at most twice as often as the board answers.
+// Without a key, a program that receives the host's datagrams can pass for the host. In this test
+// the crowd receives no datagram of a host.
 std::string Crowd::say_something() {
   const std::string number = std::to_string(random_.below(1ULL << 32));
   const std::string sid = fmt::format(";SID:{:016x}", random_.next());

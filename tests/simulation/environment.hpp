@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The number of simulations and the choice of one: numbers from the environment.
+// The number of simulations and the selected simulation, from environment variables.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Days of a fleet of a hundred boards in virtual time: the application of each board and the
-// session of its host. The network between them loses a tenth of the datagrams. Faults hit one link
-// or all links. The memory does not grow, a board trips only after a fault, and each board is safe
-// in time and comes back. R4_FLEET_HOURS sets the length (168 are seven days), R4_SEED another run.
+// session of its host. The network between them loses a tenth of the datagrams. Faults affect one
+// link or all links. The memory does not grow. A board trips only after a fault, is safe in time,
+// and becomes active again. R4_FLEET_HOURS sets the length (168 are seven days), and R4_SEED
+// another run.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -33,13 +34,13 @@ constexpr std::uint64_t one_second_us = 1'000'000;
 constexpr std::uint64_t silence_limit_us = 1'020'000;               // the timeout and 20 ms
 constexpr std::uint64_t comes_back_within_us = 15 * one_second_us;  // although datagrams are lost
 // A board that has restarted is active when a host echoes its second heartbeat, after half a
-// second. If that heartbeat is lost, the first connection ends after a second, and the next
+// second. If the heartbeat is lost, the first connection ends after a second, and the next
 // connection starts at once.
 constexpr std::uint64_t connecting_us = 2 * one_second_us;
 constexpr double lost = 0.1, twice = 0.01, damaged = 0.001;
 
 struct Packet {
-  // at the receiver, which gets it at `at_us`: waiting packets stay in order
+  // The arrival at the receiver, which reads the packet at `at_us`. Waiting packets stay in order.
   std::uint64_t came_us = 0;
   std::uint64_t at_us = 0;
   bool to_board = false;
@@ -48,7 +49,7 @@ struct Packet {
   std::array<char, 512> bytes;
 };
 
-// The datagrams under way, and those that wait for a host that hangs for half a minute.
+// The datagrams under way, and the datagrams that wait for a host that hangs for half a minute.
 class Path {
   auto later() const {
     return [this](std::uint8_t a, std::uint8_t b) {
@@ -65,7 +66,7 @@ class Path {
     std::pop_heap(order_.begin(), order_.begin() + count_, later());
     return packets_[order_[static_cast<std::size_t>(--count_)]];
   }
-  // False: the path is full.
+  // False if the path is full.
   bool put(const Packet& packet) {
     if (count_ == static_cast<std::ptrdiff_t>(packets_.size())) return false;
     packets_[order_[static_cast<std::size_t>(count_++)]] = packet;
@@ -79,7 +80,6 @@ class Path {
   std::ptrdiff_t count_ = 0;
 };
 
-// One board and its host.
 class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Handler {
  public:
   explicit FleetLink(std::uint64_t seed) : random_(seed) {
@@ -113,7 +113,7 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
   // --- faults
 
   void cut(std::uint64_t length_us) { cut_until_us_ = now_us_ + length_us; }
-  // The thread of all hosts does nothing; datagrams that arrive wait.
+  // The thread of all hosts hangs. Arriving datagrams wait.
   void hold_up(std::uint64_t length_us) { held_until_us_ = now_us_ + length_us; }
   void restart_board() {
     restarted_us_ = now_us_;
@@ -185,7 +185,7 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
     if (now_us_ < cut_until_us_) return;
     for (int copies = random_.chance(twice) ? 2 : 1; copies > 0; --copies) {
       if (random_.chance(lost)) continue;
-      // Up to 20 ms, so some datagrams overtake others.
+      // The delay is at most 20 ms, so some datagrams overtake others.
       Packet packet{};
       packet.at_us = packet.came_us = now_us_ + 500 + random_.below(20'000);
       packet.to_board = to_board;
@@ -213,18 +213,15 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
     }
   }
 
-  // firmware::Hal
   void apply(const firmware::Outputs&) override {}
   void make_safe() override {}
   void sample(firmware::Inputs& inputs) override { inputs.handle = Handle::held; }
   void zero(int) override {}
   bool clear_fault() override { return true; }
-  // firmware::Port
   void send(Text bytes, Priority, std::uint32_t) override {
     transfer(false, {bytes.data(), bytes.size()});
   }
   std::size_t max_size() const override { return max_datagram; }
-  // test::DrivenSession::Handler
   SendResult transmit(std::size_t, std::string_view bytes, Priority) override {
     transfer(true, bytes);
     return SendResult::sent;
@@ -256,7 +253,8 @@ TEST(FleetDays, MemoryDoesNotGrowAndFalseTripsAreRare) {
   for (std::size_t i = 0; i < fleet_size; ++i) {
     fleet.push_back(std::make_unique<FleetLink>(random.next()));
   }
-  // In each hour one fault of all links and one of each link; in a short run they come sooner.
+  // In each hour there is one fault of all links and one fault of each link. A short run has them
+  // sooner.
   const std::uint64_t interval = std::min<std::uint64_t>(3600, seconds / 3);
   std::uint64_t faults = 0, restarts = 0;
   std::size_t heap = 0;
@@ -311,7 +309,7 @@ TEST(FleetDays, MemoryDoesNotGrowAndFalseTripsAreRare) {
   EXPECT_GT(restarts, 10U);
   EXPECT_GT(trips, 2 * fleet_size);
   EXPECT_GT(confirmed * 100, asked * 90);
-  // The session allocates some memory when it needs it first. A leak of one byte per datagram would
+  // The session allocates some memory at its first use. A leak of one byte per datagram would
   // exceed the limit.
   EXPECT_LT(static_cast<std::int64_t>(heap_after - heap), 1024 * std::int64_t{fleet_size});
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The promises of docs/design/safety-argument.md under random faults. R4_SCHEDULES sets the number
-// of schedules (30,000 by default; tools/test sets it). A fifth as many run with standstills, and a
-// tenth with several paths. Their seeds start at R4_FIRST_SEED (1 by default), so that a long run
-// can continue where another run ended. R4_SEED replays one schedule and prints its trace.
+// of schedules (30,000 by default; tools/test sets it). A fifth of this number runs with
+// standstills, and a tenth with several paths. The seeds start at R4_FIRST_SEED (1 by default), so
+// that a long run can continue an earlier run. R4_SEED replays one schedule and prints its trace.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -26,7 +26,6 @@ std::string tail_of(const Report& report, std::size_t lines) {
   return text;
 }
 
-// Adds the counts of one report to `sum`.
 void add(Report& sum, const Report& report) {
   sum.executed += report.executed;
   sum.executed_groups += report.executed_groups;
@@ -82,7 +81,7 @@ void replay(World::Beside beside) {
   EXPECT_EQ(report.sampled_wrongly, 0U);
 }
 
-// Runs this number of schedules; no promise may be broken.
+// Runs this number of schedules. No promise may be broken.
 Report run_all(std::uint64_t schedules, World::Beside beside) {
   const std::uint64_t first = from_environment("R4_FIRST_SEED", 1);
   std::atomic<std::uint64_t> next{first};
@@ -194,17 +193,16 @@ TEST(LinkSimulation, KeepsEveryPromiseOverSeveralPaths) {
   EXPECT_GT(sum.served_us, schedules * 500'000);
 }
 
-// Regression test: seeds that once broke a promise, and why.
 TEST(LinkSimulation, KeepsEveryPromiseForSeedsThatOnceFailed) {
-  // The last BUSY of a lagging path made the other paths wait longer than their own BUSY asked
-  // (415). A BUSY from before a path had joined counted beside those of the other paths, and held
-  // the commands back (18012, with the same cause as 415). Before the session's first heartbeat one
-  // path's answer was from before a restart that another path showed: each path had a separate
-  // clock (98796, 103256). A path that reported late that the board was booting made the host begin
-  // anew, although other paths had reported that earlier and nothing since (104104, 115880), or
-  // were silent (271382, 446043). A heartbeat was taken for the confirmation of a farewell,
-  // although the heartbeat was of the same millisecond as a state sent before the farewell
-  // (756480).
+  // 415: a lagging path's last BUSY must not delay other paths longer than their own BUSY.
+  // 18012: a BUSY from before a path joined must not hold commands back.
+  // 98796, 103256: before the session's first heartbeat, a path's answer is from before a restart
+  // that another path shows.
+  // 104104, 115880: a path reports late that the board boots. Other paths have reported it earlier,
+  // and nothing since.
+  // 271382, 446043: as 104104, but the other paths are silent.
+  // 756480: a heartbeat must not confirm a farewell if its millisecond is that of a state from
+  // before the farewell.
   for (const std::uint64_t seed :
        {415U, 18012U, 98796U, 103256U, 104104U, 115880U, 271382U, 446043U, 756480U}) {
     EXPECT_EQ(World(seed, false, World::Beside::paths).run().violation, "") << "seed " << seed;
@@ -229,7 +227,7 @@ TEST(LinkSimulation, TripsFalselyLessThanOnceADayAtTenPercentLoss) {
   day.settings.state_rate_hz = 1;
   day.to_board.loss = day.to_host.loss = 0.1;
   day.command_interval_us = 3'600'000'000U;
-  day.board_drift_ppm = Schedule::most_drift_ppm;  // leaves the host less time
+  day.board_drift_ppm = Schedule::most_drift_ppm;  // the host has less time
   const Report report = World(1, day, false).run();
   fmt::print("false trips in a day at 10 % loss: {}\n", report.link_losses);
   EXPECT_EQ(report.violation, "");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // docs/examples/openpodcar with joystick, cmd_vel and goals, in virtual time: which input drives,
-// and how far the car rolls when that input disappears.
+// and how far the car rolls after the input ends.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ constexpr int joy_period_ms = 50;       // joy_node repeats its message with thi
 constexpr int cmd_vel_period_ms = 100;  // the period of teleop_twist_keyboard and similar nodes
 constexpr double nan_number = std::numeric_limits<double>::quiet_NaN();
 
-// The program in main_ros2.cpp, on a session in place of a board, and the publishers.
+// The program in main_ros2.cpp, with a session in place of a board, and the publishers.
 class PilotRun {
  public:
   explicit PilotRun(std::uint64_t seed = 1)
@@ -46,14 +46,15 @@ class PilotRun {
   void pass(int ms) {
     for (; ms > 0; --ms) pass_millisecond();
   }
-  // Presses and releases Start. Then the board is armed, unless it refuses.
+  // Presses and releases Start. This arms the board, unless it refuses.
   void press_start() {
     start = true;
     pass(200);
     start = false;
     pass(300);
   }
-  // How far the car rolls until it stands. It must stop within `seconds` and stand for two seconds.
+  // The distance that the car rolls until it stops. It must stop within `seconds` and stay stopped
+  // for two seconds.
   double rolls_m(int seconds = 10) {
     const double from_m = model.travelled_m();
     int standing_ms = 0;
@@ -74,8 +75,7 @@ class PilotRun {
   }
   bool driving() const { return phase_ == Phase::driving; }
 
-  // The messages that are published periodically. Those of the joystick stop if `joystick` is
-  // false.
+  // The messages that are published periodically. Without `joystick`, the joystick's messages end.
   bool joystick = true;
   bool hold = false, start = false, stop = false;
   float speed_axis = 0, steering_axis = 0;
@@ -267,12 +267,12 @@ TEST(OpenPodcarPilot, TheJoystickHasPrecedenceAndADroppedGoalStaysDropped) {
   EXPECT_NEAR(run.podcar.speed_m_s(), -0.3, 0.05);
   EXPECT_FALSE(run.to_goal(50, 0).empty());
   run.hold = false;
-  run.rolls_m();  // although cmd_vel is still published
+  run.rolls_m();  // although cmd_vel is published
   EXPECT_FALSE(run.moves_within(2000));
   run.press_start();
   EXPECT_TRUE(run.moves_within(2000));
   run.cmd_vel.reset();
-  run.rolls_m();  // the goal was dropped
+  run.rolls_m();  // the goal has ended
   EXPECT_FALSE(run.moves_within(2000));
 }
 
@@ -280,7 +280,7 @@ TEST(OpenPodcarPilot, TheJoystickHasPrecedenceAndADroppedGoalStaysDropped) {
 struct PilotMishap {
   const char* name;
   void (*set)(PilotRun&, bool happens);
-  double most_m;  // the car may roll so far from 1.22 m/s
+  double most_m;  // the longest distance that the car may roll, from 1.22 m/s
 };
 
 TEST(OpenPodcarPilot, WaitsForStartAfterAnyEndOfADrive) {
@@ -327,7 +327,7 @@ TEST(OpenPodcarPilot, StopsWhenTheJoystickDisconnectsWithItsButtonHeld) {
   EXPECT_LE(rolled_m, allowed_m);
   EXPECT_EQ(run.pilot.why(), "the joystick is silent");
   EXPECT_TRUE(run.robot.model().pins().is_safe());
-  run.joystick = true;  // its button is still held
+  run.joystick = true;  // its button is pressed
   EXPECT_FALSE(run.moves_within(3000));
 }
 
@@ -370,7 +370,7 @@ TEST(OpenPodcarPilot, HoldingStartDownArmsOnlyOnce) {
   run.robot.model().hold_handle(true);
   EXPECT_FALSE(run.moves_within(3000));
   EXPECT_FALSE(run.driving());
-  run.press_start();  // pressed before and still pressed
+  run.press_start();  // Start is already pressed
   run.press_start();
   EXPECT_TRUE(run.moves_within(2000));
 }
@@ -385,7 +385,7 @@ TEST(OpenPodcarPilot, DoesNotDriveWithTwoJoysticks) {
   run.pass(100);
   EXPECT_FALSE(run.driving());
   EXPECT_EQ(run.pilot.why(), "there are two joysticks");
-  run.start = true;  // pressed on one joystick, while the other joystick reports it released
+  run.start = true;  // pressed on only one of the two joysticks
   for (int ms = 0; ms < 1000; ms += 10) {
     run.pilot.on_joy(axes, buttons, run.robot.clock(), 7);
     run.pass(10);
@@ -400,7 +400,7 @@ TEST(OpenPodcarPilot, DoesNotDriveWithTwoJoysticks) {
 TEST(OpenPodcarPilot, ANewDriveStartsWithAResetController) {
   Podcar podcar;
   podcar.begin_drive();
-  for (int i = 0; i < 200; ++i) podcar.drive({1, 0}, 0.01);  // the cable of the encoder is off
+  for (int i = 0; i < 200; ++i) podcar.drive({1, 0}, 0.01);  // the encoder is disconnected
   ASSERT_EQ(podcar.drive({1, 0}, 0.01)[0].value, pwm_max);
   podcar.begin_drive();
   EXPECT_EQ(podcar.drive({0.1, 0}, 0)[0].value, 0);
@@ -468,7 +468,7 @@ TEST(OpenPodcarPilot, RefusesInputsThatAreNotNumbers) {
   run.press_start();
   EXPECT_TRUE(run.driving());
   run.speed_axis = 7;
-  run.stop = true;  // the stop counts nevertheless
+  run.stop = true;  // the stop is obeyed although the axis is invalid
   run.pass(100);
   EXPECT_EQ(run.pilot.why(), "the stop button");
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // docs/examples/openpodcar in virtual time: its control and its model, joined by the firmware, the
-// session and a link with a delay. Measures how well the car keeps to its course, and how far it
-// rolls after an incident at speed.
+// session and a link with a delay. Measures how well the car keeps its course, and how far it rolls
+// after an incident at speed.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ using control::LoopEnd;
 constexpr VirtualRobot::Link podcar_link{.delay_us = 5000, .jitter_us = 2000, .loss = 0.01};
 constexpr double board_timeout_s = 1.0;
 
-// The program in main.cpp, on a session in place of a board. Its steps are the steps of the
+// The program in main.cpp, with a session in place of a board. Its steps are the steps of the
 // program.
 class PodcarRun {
  public:
@@ -48,7 +48,7 @@ class PodcarRun {
     begun_ = true;
   }
 
-  // One millisecond; false after the loop has ended.
+  // Advances the time by a millisecond. False after the loop has ended.
   bool pass() {
     robot.pass_millisecond();
     if (!robot.host_lives) return false;
@@ -62,8 +62,8 @@ class PodcarRun {
   double deviation() const {
     return std::abs(course.deviation_m(model.place().x_m, model.place().y_m));
   }
-  // How far the car rolls until it stands. It must stop within ten seconds and stand for two
-  // seconds.
+  // The distance that the car rolls until it stops. It must stop within ten seconds and stay
+  // stopped for two seconds.
   double rolls_m() {
     const double from_m = model.travelled_m();
     int standing_ms = 0;
@@ -149,7 +149,7 @@ TEST(OpenPodcar, PassesItsWaypoints) {
   EXPECT_LE(nearest_m.back(), 0.25);
 }
 
-// An incident at 1 m/s, and how far the car may roll.
+// An incident at 1 m/s.
 struct Mishap {
   const char* name;
   void (*happen)(PodcarRun&);
@@ -230,8 +230,8 @@ TEST(OpenPodcar, StopsWhenTheSteeringSensorFails) {
   EXPECT_NE(run.guard.why().find("AINSTEER"), std::string::npos) << run.guard.why();
 }
 
-// The clock does not show this restart: the board ran longer after it than before, until the host
-// heard it again.
+// The clock does not show this restart: until the host connects again, the board runs longer than
+// it ran before the restart.
 TEST(OpenPodcar, KeepsItsPoseWhenTheBoardRestarts) {
   Podcar podcar;
   State state;

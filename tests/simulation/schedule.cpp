@@ -70,7 +70,7 @@ Schedule Schedule::random(Random& random) {
   if (random.chance(0.3)) {
     s.attack_interval_us = static_cast<std::uint32_t>(random.between(2'000, 200'000));
   }
-  // A host that ends and comes back, perhaps before its farewell has arrived.
+  // A host that ends and restarts, perhaps before its farewell has arrived.
   for (std::uint64_t n = random.chance(0.3) ? random.between(1, 3) : 0; n != 0; --n) {
     Happening leave;
     leave.kind = Happening::Kind::leave;
@@ -82,7 +82,7 @@ Schedule Schedule::random(Random& random) {
   return s;
 }
 
-// Watchers come and go; sometimes there are more than the board has places for.
+// Watchers begin and end. Sometimes the board has too few places for them.
 void Schedule::add_watchers(Random& random) {
   watchers = static_cast<int>(random.between(1, 6));
   for (int i = 0; i < watchers; ++i) {
@@ -126,7 +126,7 @@ const ChannelFaults& Schedule::faults(int path, bool toward_board) const {
   return toward_board ? faults.to_board : faults.to_host;
 }
 
-// In most schedules one path is good except for its happenings. A happening hits one path or
+// In most schedules one path is good except for its happenings. A happening affects one path or
 // several paths at once.
 void Schedule::add_paths(Random& random) {
   for (std::uint64_t n = random.between(1, 2); n != 0; --n) {

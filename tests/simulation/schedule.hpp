@@ -10,55 +10,52 @@
 
 namespace r4::simulation {
 
-// The faults of one direction of the channel.
 struct ChannelFaults {
   double loss = 0;
   double duplicate = 0;
   double corrupt = 0;
-  std::uint32_t delay_us = 500;  // of every datagram
-  std::uint32_t jitter_us = 0;   // added at random, uniform: changes the order
-  double straggle = 0;           // the share of datagrams that are delayed far longer
+  std::uint32_t delay_us = 500;  // delay of every datagram
+  std::uint32_t jitter_us = 0;   // random uniform extra delay, which changes the order
+  double straggle = 0;           // the share of datagrams with the long delay straggle_us
   std::uint32_t straggle_us = 0;
 };
 
-// An event at a time of the scenario.
 struct Happening {
   enum class Kind : std::uint8_t {
-    cut,           // loses everything in both directions for `length_us`
-    cut_to_board,  // … from host to board only
+    cut,           // all datagrams are lost in both directions for `length_us`
+    cut_to_board,  // datagrams from host to board are lost
     cut_to_host,
-    host_restart,  // the host process dies and comes back after `length_us`
-    host_freeze,   // the application hangs: its watchdog stops the heartbeats for `length_us`
+    host_restart,  // the host process is killed and restarts after `length_us`
+    host_freeze,   // the application hangs, so its watchdog stops the heartbeats for `length_us`
     board_restart,
     port_down,  // the board's port reports that its transport is lost
-    stop,       // the host asks for an emergency stop, and clears it after `length_us`
+    stop,       // the host sends an emergency stop, and clears it after `length_us`
     handle,     // the dead-man's handle is released for `length_us`
-    obstacle,   // an obstacle is before sensor 1 for `length_us`
+    obstacle,   // sensor 1 sees an obstacle for `length_us`
     address,    // the host's datagrams come from another address, permanently or for `length_us`
-    // another process asks for an emergency stop and ends, after `length_us` at the latest
+    // another process sends an emergency stop and ends, after `length_us` at the latest
     stopper,
-    leave,          // the host process sends a farewell and ends; it comes back after `length_us`
+    leave,          // the host process sends a farewell, ends, and restarts after `length_us`
     watch,          // a program watches for `length_us`; `host` is its number
-    watcher_stops,  // … and asks for an emergency stop
-    // The host's end of a path is gone for `length_us`, and the system reports that. The board's
-    // port is gone with it if each path has one.
+    watcher_stops,  // a watcher sends an emergency stop
+    // The host's end of a path is disconnected for `length_us`, and the system reports it. The
+    // board's port is also disconnected if each path has its own port.
     unplug,
-    stall,  // datagrams sent on a path wait until `length_us` are over
+    stall,  // datagrams sent on a path wait until `length_us` has passed
   };
   Kind kind;
   std::uint64_t at_us;
   std::uint64_t length_us;
   int host;
-  // Bit w: a happening of paths hits path w. An unplug hits the lowest of these paths.
+  // Bit w: a happening of paths affects path w. An unplug affects only the lowest of these paths.
   std::uint8_t paths = 0xFF;
 };
 
-// The two directions of a path.
 struct PathFaults {
   ChannelFaults to_board, to_host;
 };
 
-// The board's loop does nothing for this time; datagrams that arrive wait.
+// The board's loop does not run for this time. Arriving datagrams wait.
 struct Standstill {
   std::uint64_t at_us;
   std::uint64_t length_us;
@@ -66,38 +63,38 @@ struct Standstill {
 
 struct Schedule {
   std::uint64_t duration_us = 0;
-  int hosts = 1;              // the second host disturbs the first
-  bool shared_place = false;  // the stopper has the first host's place, as on a CAN bus
+  int hosts = 1;              // the second host disturbs the first host
+  bool shared_place = false;  // the stopper is the same peer as the first host, as on a CAN bus
   Settings settings;
-  ChannelFaults to_board, to_host;  // of the first path
+  ChannelFaults to_board, to_host;  // faults of the first path
   std::vector<PathFaults> more_paths;
-  // true: all paths are places at one port of the board; false: each has its own port
+  // true: all paths are peers at one port of the board; false: each path has its own port
   bool one_port = false;
-  // Before the scenario, an hour ago, the first host had the board for a second: this path replays
-  // the datagrams of that second, in both directions. -1: no path does.
+  // An hour before the scenario, the first host controlled the board for a second. This path
+  // replays the datagrams of the second in both directions. -1: no path replays them.
   int replaying_path = -1;
   bool reboots_after_capture = false;
   int attacked_path = 0;
   // A stranger (stranger.hpp) on the attacked path sends about this often while a host is in
-  // control, and at other times only the share below of these times; 0: there is no stranger.
+  // control. At other times it sends only the share `stranger_claims`. 0: there is no stranger.
   std::uint32_t stranger_interval_us = 0;
-  double stranger_claims = 0;  // this share
+  double stranger_claims = 0;
   std::vector<Happening> happenings;
   std::vector<Standstill> standstills;  // in the order of time
   std::uint32_t command_interval_us = 0;
   std::uint32_t command_timeout_us = 0;
-  double post_share = 0;   // of commands sent without a confirmation
-  double group_share = 0;  // of commands that are a group: the same target for all steppers
+  double post_share = 0;                // share of commands sent without a confirmation
+  double group_share = 0;               // share of groups, with the same target for all steppers
   std::uint32_t board_lateness_us = 0;  // the board's loop runs up to this much late
-  // The board's clock is faster or slower than the clocks of the hosts.
+  // How much the board's clock is faster than the clocks of the hosts, or slower if negative.
   std::int64_t board_drift_ppm = 0;
   static constexpr std::int64_t most_drift_ppm = 100;
-  // With an attacker the board has a key for each host. The attacker acts about this often; 0: no
+  // With an attacker the board has a key for each host. The attacker acts about this often. 0: no
   // attacker and no keys.
   std::uint32_t attack_interval_us = 0;
   bool keys = false;  // keys without an attacker
   int watchers = 0;
-  // A program asks for leases in the name of other programs about this often; 0: no such program.
+  // A program requests leases in the name of other programs about this often. 0: no such program.
   std::uint32_t forge_interval_us = 0;
 
   static Schedule random(Random& random);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A script decides in place of chance what happens in a world: which processes run, which host
-// commands, and what happens to each datagram (search/play.hpp).
+// A script decides in place of chance which events occur in a world: which processes run, which
+// host commands, and what happens to each datagram (search/play.hpp).
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,13 @@ namespace r4::simulation {
 
 class World::Script {
  public:
-  // All hosts exist, and none of them runs.
+  // All hosts exist, and no host runs.
   virtual void begin() = 0;
-  // The time of the schedule is over, and every promise held.
+  // The time of the schedule is over, and no promise was broken.
   virtual void end() = 0;
-  // An event that the script asked for.
+  // An event that the script has requested.
   virtual void on_event(int index) = 0;
-  // After each event.
+  // Called after each event.
   virtual void check() = 0;
 
   virtual void set(SessionOptions& options) const = 0;
@@ -31,10 +31,10 @@ class World::Script {
   virtual bool takes(const Packet& arrived) = 0;
   virtual void before_board(const Packet& packet) = 0;
   virtual void after_board(const Packet& packet) = 0;
-  // The board sends. True if the script keeps this datagram from going to the hosts directly.
+  // The board sends a datagram. True if the script delivers the datagram to the hosts itself.
   virtual bool on_board_sent(std::uint8_t port, std::uint32_t peer, Priority priority,
                              std::string_view bytes) = 0;
-  // The board has executed a command. False if it is a command of a stranger.
+  // The board has executed a command. False if a stranger sent the command.
   virtual bool on_executed(const Command& command) = 0;
   // The board has become SAFE(link).
   virtual void on_link_lost() = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A wheel's speed, controlled from a host at 100 Hz over a link with delay and loss, in virtual
-// time: the values that docs/how-to/control.md promises.
+// A host controls a wheel's speed at 100 Hz over a link with delay and loss, in virtual time.
+// Checks the values that docs/how-to/control.md promises.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ using control::LoopEnd;
 
 constexpr VirtualRobot::Link slow_link{.delay_us = 5000, .jitter_us = 2000, .loss = 0};
 constexpr VirtualRobot::Link lossy_link{.delay_us = 5000, .jitter_us = 2000, .loss = 0.2};
-constexpr double top_m_s = 2.0;  // of the wheel below, at 4000 counts a second
+constexpr double top_m_s = 2.0;  // top speed of the wheel, at 4000 counts a second
 
 control::LoopOptions speed_loop_options() {
   control::LoopOptions options;
@@ -31,7 +31,7 @@ control::LoopOptions speed_loop_options() {
   return options;
 }
 
-// The loop of docs/how-to/control.md, on a session in place of a board.
+// The loop of docs/how-to/control.md, with a session in place of a board.
 class SpeedLoop {
  public:
   enum class By { counts, frequency };
@@ -59,7 +59,7 @@ class SpeedLoop {
     guard.start(robot.clock());
     began = true;
   }
-  // Seconds until the speed stays within 5 % of the wanted speed.
+  // Seconds until the speed stays within 5 % of the commanded speed.
   double settled_s() const {
     std::size_t last = 0;
     for (std::size_t i = 0; i < speeds.size(); ++i) {

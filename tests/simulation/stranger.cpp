@@ -10,7 +10,7 @@
 namespace r4::simulation {
 namespace {
 
-// The field with this name, its value and its end; empty if there is none.
+// The field with this name, its value and its end. Empty if there is no such field.
 std::string_view field_in(std::string_view bytes, std::string_view name) {
   for (std::size_t at = bytes.find(name); at != std::string_view::npos;
        at = bytes.find(name, at + 1)) {
@@ -70,7 +70,7 @@ std::string Stranger::say(Random& random, std::uint32_t next) {
     default:
       break;
   }
-  std::string name;  // of a paper host
+  std::string name;  // the SID field; empty for a paper host
   switch (random.below(4)) {
     case 0:
       name = own_name;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A stranger has no key and does not hear any host, so it knows the id of no session. It knows what
-// the board sends to watchers and to everyone, and the answers to its own datagrams. It guesses
-// packet numbers well.
+// A stranger has no key and does not receive any host's datagrams, so it has no session's SID. It
+// receives the datagrams that the board sends to watchers and to everyone, and the answers to its
+// own datagrams. Its guesses of packet numbers are good.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace r4::simulation {
 class Stranger {
  public:
   static constexpr std::uint32_t address = 0xFFFD;
-  // The stranger's commands ask a stepper for this position. No command of a host asks for it.
+  // The target of the stranger's stepper commands. No command of a host has this target.
   static constexpr int target = -7777;
   // The field SID of the stranger's own session.
   static constexpr const char* own_name = "SID:00c0ffee00c0ffee;";
@@ -23,18 +23,20 @@ class Stranger {
   // The board has sent this datagram to the stranger.
   void hears(std::string_view bytes);
 
-  // A datagram of any kind but E:STOP. `next`: the number that the host in control uses next.
+  // Returns a datagram of any kind but E:STOP. `next`: the number that the host in control uses
+  // next.
   std::string say(Random& random, std::uint32_t next);
 
-  // Returns `next` if the stranger knows a number near it. Otherwise it returns a made-up number.
+  // Returns `next` if the stranger has a number near it. Otherwise it returns the number after its
+  // newest CMD.
   std::uint32_t guess(std::uint32_t next) const;
-  // The T of the newest heartbeat; 0 before the first.
+  // The T of the newest heartbeat. 0: no heartbeat yet.
   std::uint32_t echo() const { return echo_; }
   // The newest cause that the board has reported.
   std::int32_t cause() const { return cause_; }
   // The token that the stranger must echo for its lease.
   std::uint32_t lease() const { return lease_; }
-  // The field SID with which the stranger may pass for the host; empty if the board has sent it no
+  // The field SID with which the stranger may pass for the host. Empty if the board has sent it no
   // SID.
   const std::string& name() const { return name_; }
 

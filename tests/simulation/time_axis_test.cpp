@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Eight boards on one bus, in virtual time: clocks that drift apart, the shipped application, and a
-// session at the host for each board. The sampling times that the sessions report form one time
-// axis.
+// session for each board. The sampling times that the sessions report form one time axis.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -31,8 +30,8 @@ class SharedBus {
     std::string bytes;
   };
 
-  // One after the other, at 1 Mbit/s. A packed frame has 32 characters and takes 110 us. Reading it
-  // takes up to half of that again. This gives the load of docs/how-to/can.md.
+  // Frames follow each other, at 1 Mbit/s. A packed frame has 32 characters and takes 110 us.
+  // Reading a frame takes up to half of this time. This gives the load of docs/how-to/can.md.
   void put(std::uint64_t now_us, std::size_t board, bool to_board, std::string_view bytes) {
     const std::uint64_t frames = bytes.size() / 32 + 1;
     free_us_ = std::max(free_us_, now_us) + 110 * frames;
@@ -62,7 +61,6 @@ struct AxisClock {
   }
 };
 
-// A board and its session.
 class AxisLink final : public firmware::Hal,
                        public firmware::Port,
                        public test::DrivenSession::Handler {
@@ -111,25 +109,22 @@ class AxisLink final : public firmware::Hal,
 
   const AxisClock clock;
   std::uint64_t board_due_us, session_due_us;
-  std::int64_t error_us = 0;  // of the newest state's time
+  std::int64_t error_us = 0;  // error of the newest state's time
   std::int64_t bound_us = 0;
   int states = 0, dishonest = 0;
 
  private:
   Time time() const { return Time{static_cast<std::int64_t>(now_us_)}; }
 
-  // firmware::Hal
   void apply(const firmware::Outputs&) override {}
   void make_safe() override {}
   void sample(firmware::Inputs& inputs) override { inputs.handle = Handle::held; }
   void zero(int) override {}
   bool clear_fault() override { return true; }
-  // firmware::Port
   void send(Text datagram, Priority, std::uint32_t) override {
     bus_.put(now_us_, number_, false, {datagram.data(), datagram.size()});
   }
   std::size_t max_size() const override { return max_datagram; }
-  // test::DrivenSession::Handler
   SendResult transmit(std::size_t, std::string_view bytes, Priority) override {
     bus_.put(now_us_, number_, true, bytes);
     return SendResult::sent;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A robot, its board and its host in virtual time: the firmware on the models of its chips, the
-// shipped session, and between them a link with delay and loss. One seed gives one run.
+// shipped session, and a link with delay and loss. One seed gives one run.
 #pragma once
 
 #include <functional>
@@ -20,7 +20,7 @@ class VirtualRobot final : public firmware::Port, public test::DrivenSession::Ha
   using Clock = ReceivedState::Clock;
   struct Link {
     std::uint64_t delay_us = 5000;
-    std::uint64_t jitter_us = 2000;  // added to or taken from the delay, uniform
+    std::uint64_t jitter_us = 2000;  // added to or subtracted from the delay, uniform
     double loss = 0;                 // in each direction
   };
 
@@ -30,13 +30,12 @@ class VirtualRobot final : public firmware::Port, public test::DrivenSession::Ha
 
   // Waits until the board is ACTIVE under our control and armed.
   bool arm();
-  // One millisecond passes for robot, board, link and host.
+  // Advances robot, board, link and host by one millisecond.
   void pass_millisecond();
   void pass(std::uint64_t ms) {
     while (ms-- != 0) pass_millisecond();
   }
 
-  // Called with each state when it arrives.
   std::function<void(const ReceivedState&)> state_came;
   bool link_cut = false;     // loses everything in both directions
   bool host_lives = true;    // false: the process is killed and sends nothing
@@ -58,10 +57,8 @@ class VirtualRobot final : public firmware::Port, public test::DrivenSession::Ha
   void put(bool to_board, std::string_view bytes);
   std::uint32_t board_ms() const { return boot_ms_ + static_cast<std::uint32_t>(now_us_ / 1000); }
 
-  // firmware::Port
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
-  // DrivenSession::Handler
   SendResult transmit(std::size_t, std::string_view bytes, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram& datagram) override;
 

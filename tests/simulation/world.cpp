@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The run of a simulation: events in the order of their times, and the trace of all of them.
+// The run of a simulation: events in the order of their times, and the trace of all events.
 #include "world.hpp"
 
 #include <fmt/format.h>
@@ -22,7 +22,8 @@ constexpr std::int64_t million = 1'000'000;
 World::World(std::uint64_t seed, bool keep_trace, Beside beside)
     : World(seed, Schedule(), keep_trace) {
   schedule_ = Schedule::random(random_);
-  // A separate generator: the other events of a schedule stay the same with and without watchers.
+  // A separate generator, so that the other events of a schedule are the same with and without
+  // watchers.
   Random watch_random(seed + 0x5eed);
   if (watch_random.chance(0.3)) schedule_.add_watchers(watch_random);
   if (beside == Beside::standstills) schedule_.add_standstills(loop_random_);
@@ -54,7 +55,7 @@ World::~World() = default;
 
 Report World::run() {
   report_.trace_hash = 0xcbf29ce484222325U;
-  commands_.emplace_back();  // 0 is the position at the start: no command has this name
+  commands_.emplace_back();  // 0 is the position at the start, so no command has this name
   boot_board();
   if (schedule_.replaying_path >= 0) record();
   for (int i = 0; i < schedule_.hosts; ++i) {

@@ -1,55 +1,55 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The link simulator: the board's application and the host's session, exactly as they ship, joined
-// by a faulty channel in virtual time. One seed gives one run, to the last byte.
+// The link simulator: the shipped application of the board and the shipped session of the host,
+// joined by a faulty channel in virtual time. One seed gives one run, to the last byte.
 //
-// While it runs it checks the promises of docs/design/safety-argument.md and stops at the first
-// broken one:
+// While it runs it checks the promises of docs/design/safety-argument.md. It stops at the first
+// broken promise:
 //    silence    outputs are live only while intact heartbeats of the host in control arrive. The
-//               last heartbeat came at most timeout + 20 ms ago, even if it waited before it was
-//               read, and was sent at most 2 timeouts + 20 ms ago. Exception: a board that stands
-//               still, until its first turn
-//    once       no command is executed twice, board restarts included
-//    whole      a group of commands is executed wholly or not at all, and reaches the hardware at
-//               once
-//    order      no command is executed that is older than the newest executed command or from
-//               before an executed stop
-//    intact     an executed command is as a host sent it, and that host controls the board
-//    fresh      an executed command was sent at most 2 timeouts + 250 ms before
-//    late       no command is executed that was overtaken more than 250 ms before by a heartbeat
-//               that fed
-//    truth      confirmed means executed; refused means not executed, then and later
-//    stop       a confirmed stop was obeyed: that stop, not another. No E:CLEAR clears a stop that
-//               came after the E:CLEAR was asked for
-//    farewell   the board obeys only the farewell of the process in control, and at once. A
-//               confirmed farewell was obeyed
-//    restore    outputs that come back belong to a host that was alive a timeout ago
-//    forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes
-//               control, except a stop
-//    stranger   a stranger (stranger.hpp) takes, keeps and resumes only its own session: in the
-//               session of a host, no datagram of the stranger is executed, makes a path or uses
-//               up a number. While no host is in control, the stranger may begin a session as any
-//               host may. The session belongs to the process whose heartbeat began it. Each SID of
-//               the stranger, and each address without a SID, counts as a separate process. A new
+//               last heartbeat arrived at most timeout + 20 ms ago, even if it waited before the
+//               board read it. It was sent at most 2 timeouts + 20 ms ago. Exception: a board whose
+//               loop does not run, until its first turn.
+//    once       no command is executed twice, even if the board restarts.
+//    whole      a group of commands is executed as a whole or not at all, and reaches the hardware
+//               at once.
+//    order      no command is executed that is older than the newest executed command or than an
+//               executed stop.
+//    intact     an executed command is as a host sent it, and this host controls the board.
+//    fresh      an executed command was sent at most 2 timeouts + 250 ms before.
+//    late       no command is executed if a heartbeat that fed overtook it more than 250 ms before.
+//    truth      a confirmed command was executed. A refused command was not executed, and is not
+//               executed later.
+//    stop       if a stop is confirmed, the board has obeyed the same stop. No E:CLEAR clears a
+//               stop that came after the E:CLEAR was requested.
+//    farewell   the board obeys only the farewell of the process in control, at once. If a farewell
+//               is confirmed, the board has obeyed it.
+//    restore    restored outputs belong to a host that was alive a timeout ago.
+//    forged     on a board with a key, no datagram of an attacker is executed, feeds or takes
+//               control, except a stop.
+//    stranger   a stranger (stranger.hpp) takes, keeps and resumes only its own session. In the
+//               session of a host, no datagram of the stranger is executed, makes a path or uses up
+//               a number. While no host is in control, the stranger may begin a session as any host
+//               may. The session belongs to the process whose heartbeat began it. Each SID of the
+//               stranger, and each address without a SID, counts as a separate process. A new
 //               session has executed no command, and its SESSION is the number of the heartbeat
-//               that began it; a session with another SESSION was resumed
+//               that began it. A session with another SESSION was resumed.
 //    kept       a host keeps the board while its heartbeats arrive in time with new numbers and
 //               fresh echoes. With keys (a signature may be late) it keeps the board while its
-//               heartbeats feed. Not checked with standstills, because a heartbeat may have waited
-//    owned      the process in control commanded the outputs that are live
-//    watch      states go to the host in control and to at most four other places, to each once.
-//               Each of these places has echoed, at most a lease ago, a token that the board sent
-//               to it. Without a host, states report that the board is safe. A watcher sends no
-//               heartbeat and no command: a watcher that feeds or drives breaks silence or intact
-//    joined     a peer becomes a path of a session only by a datagram of that session's host. No
-//               datagram recorded an hour ago feeds
-//    paths      a path meets the limits while it loses, damages and holds back nothing, takes at
-//               most 100 ms each way, is not disturbed, and both ends run. A path that both ends
-//               have used for a second and that meets the limits stays in use. While there is such
-//               a path, there is no false trip, and no command times out that had enough time on
-//               that path alone. The newest state is never older than the newest state of that
-//               path, nor older than two periods and its delay. Another path that meets the limits
-//               for 2.5 s is used, too. The host does not report BUSY while it has used such a
-//               path for 0.4 s without a BUSY there
+//               heartbeats feed. Not checked with standstills, because a heartbeat may have waited.
+//    owned      the process in control commanded the outputs that are live.
+//    watch      the host in control and at most four other peers get each state once. Each of these
+//               peers has echoed, at most a lease ago, a token that the board sent to it. Without a
+//               host, states report that the board is safe. A watcher sends no heartbeat and no
+//               command: a watcher that feeds or drives breaks silence or intact.
+//    joined     a peer becomes a path of a session only by a datagram of the session's host. No
+//               datagram recorded an hour ago feeds.
+//    paths      a path meets the limits while it loses, damages and delays no datagram, and takes
+//               at most 100 ms each way. The path is not disturbed, and both its ends run. A path
+//               that both ends have used for a second and that meets the limits stays in use. While
+//               there is such a path, there is no false trip, and no command times out that had
+//               enough time on this path alone. The newest state is never older than the newest
+//               state of this path, nor older than two periods and the path's delay. Another path
+//               that meets the limits for 2.5 s is also used. The host does not report BUSY while
+//               it has used such a path for 0.4 s without a BUSY on it.
 #pragma once
 
 #include <compare>
@@ -72,9 +72,9 @@ namespace r4::simulation {
 
 struct Report {
   std::uint64_t seed = 0;
-  std::string violation;           // empty: every promise held
+  std::string violation;           // empty: no promise was broken
   std::uint64_t trace_hash = 0;    // over every datagram and event with its time
-  std::vector<std::string> trace;  // only if a trace was asked for
+  std::vector<std::string> trace;  // only if a trace was requested
   // Counts of events, to check that the schedules reach the events under test.
   std::uint32_t executed = 0;
   std::uint32_t executed_groups = 0;
@@ -83,36 +83,35 @@ struct Report {
   std::uint32_t refused = 0;
   std::uint32_t timed_out = 0;
   std::uint32_t link_losses = 0;  // SAFE with cause link
-  std::uint32_t restores = 0;     // outputs came back because of recovery=last
+  std::uint32_t restores = 0;     // outputs restored because of recovery=last
   std::uint32_t stops = 0;
   std::uint32_t stops_confirmed = 0;
   std::uint32_t clears = 0;
-  std::uint32_t clears_refused = 0;  // by the board, because a newer stop had come
-  std::uint32_t farewells = 0;       // obeyed by the board
+  std::uint32_t clears_refused = 0;  // refused by the board because of a newer stop
+  std::uint32_t farewells = 0;       // farewells that the board obeyed
   std::uint32_t farewells_confirmed = 0;
   std::uint32_t busy = 0;
   std::uint32_t stale = 0;
   std::uint32_t duplicate = 0;
   std::uint32_t attacks = 0;   // datagrams of an attacker
-  std::uint32_t rejected = 0;  // by the board, because of their signatures
+  std::uint32_t rejected = 0;  // rejected by the board because of their signatures
   std::uint32_t executed_signed = 0;
   std::uint32_t strangers = 0;           // datagrams of a stranger
   std::uint32_t strangers_sessions = 0;  // the stranger's own sessions that began
   std::uint32_t strangers_executed = 0;  // commands in these sessions
-  std::uint32_t leases = 0;              // that began
-  std::uint32_t watched = 0;             // states that came to watchers
+  std::uint32_t leases = 0;              // leases that began
+  std::uint32_t watched = 0;             // states that watchers received
   std::uint32_t forged_leases = 0;
   std::uint32_t sampled = 0;          // states reported with a sampling time and its error
-  std::uint32_t sampled_wrongly = 0;  // … whose time was wrong by more than that error
+  std::uint32_t sampled_wrongly = 0;  // reported times whose error exceeded the reported error
   std::uint32_t standstills = 0;
   std::uint32_t waited = 0;            // datagrams that arrived during a standstill
-  std::uint32_t waited_to_feed = 0;    // … and fed
+  std::uint32_t waited_to_feed = 0;    // datagrams that waited and then fed
   std::uint64_t worst_silence_us = 0;  // from the last heartbeat to safe outputs
-  // With several paths.
   std::uint32_t joins = 0;
-  std::uint32_t path_losses = 0;  // of sessions that continued
+  std::uint32_t path_losses = 0;  // lost paths of sessions that continued
   std::uint32_t failovers = 0;    // a path in use was disturbed, and another path stayed in use
-  // commands that ended while a path met the limits all the time
+  // Commands that ended while a path met the limits all the time.
   std::uint32_t timed_on_good = 0;
   std::uint64_t copies = 0;     // duplicates that reached hosts
   std::uint32_t replayed = 0;   // datagrams recorded an hour ago
@@ -121,13 +120,13 @@ struct Report {
 
 class World : public firmware::Hal, public firmware::Observer {
  public:
-  // Additions to a schedule: the board's loop stands still at times, or there are several paths.
+  // Additions to a schedule: standstills of the board's loop, or several paths.
   enum class Beside : std::uint8_t { nothing, standstills, paths };
 
   World(std::uint64_t seed, bool keep_trace, Beside beside = Beside::nothing);
-  // The same with a given scenario.
+  // Runs a given scenario.
   World(std::uint64_t seed, Schedule schedule, bool keep_trace);
-  // The same, but a script decides what happens, and chance decides nothing (script.hpp).
+  // Runs a given scenario. The script decides instead of chance (script.hpp).
   class Script;
   World(Schedule schedule, Script& script, bool keep_trace);
   ~World();
@@ -165,9 +164,9 @@ class World : public firmware::Hal, public firmware::Observer {
     bool to_board = false;
     int host = 0;
     int place = 0;                  // the index in the host's places
-    std::uint8_t port = 0;          // of the board
+    std::uint8_t port = 0;          // the board's port
     std::uint32_t peer = 0;         // the host's address when the datagram was sent
-    std::uint32_t incarnation = 0;  // of the host when the datagram was sent
+    std::uint32_t incarnation = 0;  // the host's incarnation when the datagram was sent
     bool intact = true;
     bool heartbeat = false;
     bool recorded = false;  // replayed from an hour ago
@@ -181,41 +180,39 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint64_t arrived_us = 0;
     std::string bytes;
   };
-  // One run of a host process. Numbers of different runs do not compare.
+  // One run of a host process. The packet numbers of different runs cannot be compared.
   struct Process {
     int host = -1;
     std::uint32_t incarnation = 0;
     auto operator<=>(const Process&) const = default;
   };
   static constexpr int stranger_host = -2;
-  // A heartbeat that the board took as a sign of life.
+  // A heartbeat that fed the board.
   struct Fed {
     Process from;
     std::uint32_t pnum;
     std::uint64_t at_us;
     HostId id;
   };
-  // One command that a host asked for. The stepper target is its name: the target of channel 1, or
+  // One command of a host. The stepper target identifies the command: the target of channel 1, or
   // of all channels for a group.
   struct Sent {
     int host = 0;
     std::uint32_t incarnation = 0;
     std::uint64_t asked_us = 0;
-    std::uint64_t transmitted_us = 0;  // the last time that it was sent
+    std::uint64_t transmitted_us = 0;  // when it was last sent
     int executed = 0;
     bool group = false;
-    bool apart = false;  // its host takes the board for one without groups, because the line is bad
+    bool apart = false;         // its host assumes a board without groups, because the link is bad
     std::uint8_t channels = 0;  // bit n-1: executed on channel n
     bool dead = false;          // a refusal was reported
   };
 
-  // firmware::Hal
   void apply(const firmware::Outputs& outputs) override;
   void make_safe() override;
   void sample(firmware::Inputs& inputs) override;
   void zero(int) override {}
   bool clear_fault() override { return true; }
-  // firmware::Observer
   void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) override;
   void on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) override;
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) override;
@@ -303,7 +300,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void check_lost();
 
   Random random_;
-  Random loop_random_;  // only for standstills, so that these do not change the other events
+  Random loop_random_;  // only for standstills, so that they do not change the other events
   Schedule schedule_;
   Report report_;
   bool keep_trace_;
@@ -318,7 +315,7 @@ class World : public firmware::Hal, public firmware::Observer {
 
   std::unique_ptr<firmware::Application> board_;
   std::uint32_t boot_offset_ms_ = 0;
-  std::vector<std::uint32_t> first_times_;  // of each boot so far
+  std::vector<std::uint32_t> first_times_;  // first time of each boot
   std::uint64_t boot_us_ = 0;
   std::uint32_t board_generation_ = 0;
   bool handle_held_ = true;
@@ -326,17 +323,17 @@ class World : public firmware::Hal, public firmware::Observer {
   firmware::Outputs outputs_;
   bool live_ = false;
   bool was_lost_ = false;
-  bool standing_ = false;  // the board's loop stands still
+  bool standing_ = false;  // the board's loop does not run
   std::set<std::uint8_t> ports_lost_meanwhile_;
   std::vector<int> waiting_;  // packets that arrived during the standstill
   std::map<std::uint32_t, std::uint64_t>
-      heard_us_;                         // when the newest intact heartbeat of a peer came
-  std::uint64_t heartbeat_in_us_ = 0;    // the newest intact heartbeat that arrived
-  std::uint64_t heartbeat_sent_us_ = 0;  // when that heartbeat was sent
+      heard_us_;                         // when the newest intact heartbeat of a peer arrived
+  std::uint64_t heartbeat_in_us_ = 0;    // time of the newest intact heartbeat that arrived
+  std::uint64_t heartbeat_sent_us_ = 0;  // when the same heartbeat was sent
   std::vector<Fed> fed_;                 // during this boot of the board
-  Process delivering_;                   // the sender of the packet that the board now handles
+  Process delivering_;                   // the sender of the packet that the board is handling
   Source delivering_at_;
-  Process stop_from_;  // of the last stop executed
+  Process stop_from_;  // sender of the last executed stop
   std::uint32_t stop_pnum_ = 0;
   int newest_executed_ = -1;
   bool stopped_ = false;
@@ -344,9 +341,9 @@ class World : public firmware::Hal, public firmware::Observer {
   std::map<Process, std::uint64_t> clear_asked_us_;
   std::uint32_t next_peer_ = 1;
 
-  // The tokens that this boot of the board sent to a place, each with the time when it was sent or
-  // last echoed, and the lease that the place has. The board may forget a lease at any time: then
-  // another token renews it.
+  // The tokens that this boot of the board sent to a peer, and the peer's lease. Each token has the
+  // time when it was sent or last echoed. The board may forget a lease at any time. Then another
+  // token renews the lease.
   struct Lease {
     std::map<std::uint32_t, std::uint64_t> tokens_us;
     std::uint32_t token = 0;  // the newest echoed token; 0: none yet
@@ -357,8 +354,8 @@ class World : public firmware::Hal, public firmware::Observer {
   std::set<std::uint32_t>
       streamed_;  // the receivers of states at streamed_us_, except the host in control
   std::uint64_t streamed_us_ = 0;
-  std::uint64_t went_on_us_ = 0;  // after a standstill of the board
-  // When a path of the session was last sent a state, and how many heartbeats had fed by then.
+  std::uint64_t went_on_us_ = 0;  // end of the board's last standstill
+  // When a path of the session was last sent a state, and how many heartbeats had fed by that time.
   using Streamed = std::pair<std::uint64_t, std::size_t>;
   std::map<std::pair<std::uint8_t, std::uint32_t>, Streamed> owner_streamed_;  // by port and peer
 
@@ -366,10 +363,10 @@ class World : public firmware::Hal, public firmware::Observer {
   std::vector<Sent> commands_;
   Attacker attacker_;
   bool attacking_ = false;
-  std::set<std::uint32_t> attacker_stops_;  // the numbers of these stops
+  std::set<std::uint32_t> attacker_stops_;  // the numbers of the attacker's stops
   Stranger stranger_;
   Random stranger_random_;
-  std::uint64_t good_us_ = 0;         // when a heartbeat that must feed last came
+  std::uint64_t good_us_ = 0;         // when a heartbeat that must feed last arrived
   std::vector<std::uint32_t> shown_;  // the T of the board's newest heartbeats
   bool had_owner_ = false;            // after the previous event
   bool may_be_lost_ = false;          // in this event, by a farewell or a lost port of the board
@@ -390,18 +387,18 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint64_t cut_to_host_until_us = 0;
     std::uint64_t stalled_until_us = 0;
     std::uint64_t unplugged_until_us = 0;
-    std::uint64_t disturbed_until_us = 0;  // the path of the first host
+    std::uint64_t disturbed_until_us = 0;  // disturbances of the first host's path
     bool fine = false;                     // the path meets the limits
     std::uint64_t fine_since_us = 0;
     bool serves = false;  // the path meets the limits and both ends use it
     std::uint64_t serves_since_us = 0;
     std::uint64_t told_busy_us = 0;  // when the board last answered BUSY on this path
     bool brought_state = false;
-    std::uint32_t newest_t = 0;  // of the states that came on this path
+    std::uint32_t newest_t = 0;  // newest T of the states on this path
   };
   Path paths_[most_paths];
   Random paths_random_;
-  std::uint64_t start_us_ = 0;  // start of the schedule: an hour after the recording
+  std::uint64_t start_us_ = 0;  // an hour after the recording
   std::uint64_t looked_us_ = 0;
   struct Recorded {
     std::uint64_t at_us;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The simulated board: the application on a HAL that only remembers its outputs, and the promises
-// that are checked where the board acts.
+// The simulated board: the application on a HAL that only stores its outputs, and the promises
+// about the board's actions.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,8 +19,8 @@ bool driven(const firmware::Outputs& outputs) { return outputs != firmware::Outp
 
 }  // namespace
 
-// The board's clock begins at random. Once in 200,000 boots it is by chance within 10 s of the
-// earlier clock. A replay from the earlier boot then passes for a datagram of this boot
+// The board's clock begins at random. Once in 200,000 boots it is within 10 s of the earlier clock
+// by chance. A replay from the earlier boot then passes for a datagram of this boot
 // (docs/design/safety-argument.md). This is not an error.
 std::uint32_t World::first_time() {
   constexpr std::int32_t apart_ms = 60'000;
@@ -85,8 +85,8 @@ void World::stand_still(const Standstill& standstill) {
   at(now_us_ + standstill.length_us, Event::Kind::go_on, 0, ++board_generation_);
 }
 
-// Models a process with several sockets: its timer may come before, between or after the arrived
-// datagrams, and the process may not know that it has read all of them.
+// Models a process with several sockets. Its timer may fire before, between or after the waiting
+// datagrams. The process may not notice that it has read all datagrams.
 void World::go_on() {
   note("board goes on");
   standing_ = false;
@@ -129,7 +129,7 @@ void World::apply(const firmware::Outputs& outputs) {
   live_ = driven(outputs);
   if (report_.groups_apart == 0) check_steppers();
   if (!came_back) return;
-  // If a group was sent command by command, another channel may be the first.
+  // If a group was sent command by command, another channel may be the first channel.
   const auto first = std::find_if(std::begin(outputs.stepper), std::end(outputs.stepper),
                                   [](const firmware::StepperTarget& each) { return each.enabled; });
   const int id = first != std::end(outputs.stepper) ? first->position : 0;
@@ -144,8 +144,7 @@ void World::apply(const firmware::Outputs& outputs) {
   }
 }
 
-// Steppers 2 to 4 are commanded only by groups, which give all steppers the same target, including
-// stepper 1.
+// Steppers 2 to 4 are commanded only by groups, which give all four steppers the same target.
 void World::check_steppers() {
   const firmware::StepperTarget(&steppers)[stepper_channels] = outputs_.stepper;
   for (int i = 2; i < stepper_channels; ++i) {
@@ -254,7 +253,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   }
   Sent& sent = commands_[static_cast<std::size_t>(id)];
   sent.channels = static_cast<std::uint8_t>(sent.channels | 1U << (command.channel - 1));
-  if (command.channel != 1) {  // the other channels of a group come after its first
+  if (command.channel != 1) {  // the other channels of a group follow its first channel
     if (!sent.group || (sent.executed == 0 && !sent.apart))
       violate("intact: executed a command that nobody sent");
     return;
@@ -295,12 +294,13 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   newest_executed_ = std::max(newest_executed_, id);
 }
 
-// True if the board has a host and it is that process.
+// True if the board has a host and `process` is this host.
 bool World::controls(const Process& process) const {
   return board_->link().has_owner() && !fed_.empty() && fed_.back().from == process;
 }
 
-// After a command was handed over: if it was executed, it must have been executed as a whole.
+// The board has handled a command. If the board executed it, it must have executed the whole
+// command.
 void World::check_whole(int id) {
   const Sent& sent = commands_[static_cast<std::size_t>(id)];
   const std::uint8_t all = sent.group ? (1U << stepper_channels) - 1 : 1;
@@ -309,8 +309,8 @@ void World::check_whole(int id) {
   }
 }
 
-// The board obeys a stop. A repetition of the last stop changes nothing, and neither does an
-// attacker's stop that repeats its number.
+// The board obeys a stop. A repetition of the last stop changes nothing, also if an attacker
+// repeats the number.
 void World::on_stop(std::uint32_t pnum) {
   if (attacking_ && stopped_ && stop_pnum_ == pnum) return;
   if (!stopped_ || stop_from_ != delivering_ || stop_pnum_ != pnum) new_stop_us_ = now_us_;

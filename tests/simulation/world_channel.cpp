@@ -21,7 +21,7 @@ int World::take_slot() {
   return slot;
 }
 
-// Finds out what kind of datagram a host sent.
+// Determines the kind of datagram that a host sent.
 void World::describe(Packet& packet) {
   Datagram datagram;
   if (!read_datagram(Text(packet.bytes), datagram)) return;
@@ -104,7 +104,7 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
           packet.bytes.erase(random_.below(packet.bytes.size()), 1);
           break;
       }
-      // Still intact if only the case of a checksum digit changed: the content is unchanged.
+      // The datagram is intact if only the case of a checksum digit changed.
       Datagram changed;
       const std::size_t content = bytes.find('^');
       packet.intact = read_datagram(Text(packet.bytes), changed) &&
@@ -132,7 +132,7 @@ void World::deliver(int slot) {
 }
 
 void World::hand_over(int slot) {
-  // Take the packet out first: receiving may transfer, which may move packets_.
+  // Move the packet out first: receiving may send datagrams, which may move packets_.
   Packet packet = std::move(packets_[static_cast<std::size_t>(slot)]);
   if (script_ != nullptr && script_->takes(packet)) {
     // A bridge has the packet, or a host that does not run keeps it.

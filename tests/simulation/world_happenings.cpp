@@ -57,7 +57,7 @@ void World::happen(const Happening& happening, bool over) {
       handle_held_ = over;
       break;
     case Happening::Kind::obstacle:
-      // The threshold is set by a command, which can be lost or delayed like any command.
+      // A command sets the threshold, and can be lost or delayed like any command.
       if (!over && host.alive)
         host.session->post(Command::proximity(1, Centimetres(50)), host.time());
       distance_cm_ = over ? 200 : 10;
@@ -103,7 +103,7 @@ void World::leave(Host& host) {
   poll_host(host.index);
 }
 
-// A host that has seen the causes of the safe state asks to clear them.
+// Sends E:CLEAR if the host has received the cause of the safe state.
 void World::clear_stop(Host& host) {
   if (!host.session->knows_cause() || host.clear_ticket != 0) return;
   clear_asked_us_[{host.index, host.incarnation}] = now_us_;
@@ -111,7 +111,7 @@ void World::clear_stop(Host& host) {
   poll_host(host.index);
 }
 
-// `r4 stop` of another process, and its end.
+// `r4 stop` of another process, and the end of this process.
 void World::call_stopper(Host& stopper, bool over) {
   if (over) {
     if (stopper.alive) stopper.die();
@@ -138,14 +138,14 @@ void World::attack() {
   }
   const BoardLink& link = board_->link();
   const BoardLinkState state = link.state();
-  board_->poll(board_ms());  // so that a link lost by silence does not count for the attacker
+  board_->poll(board_ms());  // a link lost by silence must not count for the attacker
   const bool lost = link.state() != state;
   const std::uint32_t fed_ms = link.fed_ms();
   const Source source{port, address};
   const bool was_path = board_->paths().has(source);
   const std::uint32_t rejected = report_.rejected;
   attacking_ = true;
-  delivering_ = {attack.host, 0};  // no process has that incarnation
+  delivering_ = {attack.host, 0};  // no process has this incarnation
   delivering_at_ = source;
   board_->receive(port, address, Text(attack.bytes), board_ms());
   attacking_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host of the link simulator: the shipped session, and an application that commands through it.
+// A host of the link simulator: the shipped session, and an application that sends commands.
 #pragma once
 
 #include <fmt/format.h>
@@ -63,7 +63,7 @@ struct World::Host final : test::DrivenSession::Handler {
     Datagram datagram;
     if (priority == Priority::stop && read_datagram(Text(bytes), datagram))
       stop_pnum = datagram.pnum();
-    // A host that shares a place with the host in control sends only stops (docs/reference/can.md).
+    // A host that is the same peer as the host in control sends only stops (docs/reference/can.md).
     if (stopper && world.schedule_.shared_place && priority != Priority::stop) {
       return SendResult::busy;
     }
@@ -81,7 +81,7 @@ struct World::Host final : test::DrivenSession::Handler {
     const auto age_ms = static_cast<std::int32_t>(world.board_ms() - state.t_ms);
     const auto since_boot_ms = static_cast<std::int32_t>(state.t_ms - world.boot_offset_ms_);
     if (age_ms < 0 || age_ms > 60'000 || since_boot_ms < 0)
-      return;  // of an earlier boot, with another clock
+      return;  // a state of an earlier boot, with another clock
     const Time truth{
         static_cast<std::int64_t>(world.when_board_shows(state.t_ms) + clock_offset_us)};
     const Time off = std::chrono::round<Time>(state.sampled.time_since_epoch()) - truth;
@@ -104,20 +104,20 @@ struct World::Host final : test::DrivenSession::Handler {
   World& world;
   int index;
   std::uint32_t incarnation = 0;
-  std::uint32_t began_as = 0;  // the incarnation when this process began; a sleep also ends it
+  std::uint32_t began_as = 0;  // incarnation when this process began; a sleep also ends it
   bool alive = false;
   bool frozen = false;
   bool suspended = false;  // the process does not run
   bool stopper = false;
   bool watcher = false;
-  bool leaving = false;  // ends at its next turn: its stop is confirmed, or its farewell has ended
+  bool leaving = false;  // ends at its next turn, after its confirmed stop or its farewell
   struct Place {
     int path = 0;
     std::uint32_t peer = 0;        // its address on this path
     std::uint32_t other_peer = 0;  // an earlier or later address; 0: none yet
   };
   std::vector<Place> places;  // the paths of its session
-  // nullptr if the host is not on that path.
+  // nullptr if the host is not on this path.
   const Place* on(int path) const {
     for (const Place& each : places) {
       if (each.path == path) return &each;
@@ -135,8 +135,8 @@ struct World::Host final : test::DrivenSession::Handler {
     bool executed = false;
   };
   std::map<Ticket, Stop> stops;
-  std::uint32_t stop_pnum = 0;  // of the newest stop that was sent
-  std::uint32_t next_pnum = 0;  // of the next datagram
+  std::uint32_t stop_pnum = 0;  // number of the newest stop sent
+  std::uint32_t next_pnum = 0;  // number of the next datagram
   Ticket clear_ticket = 0;      // 0: no E:CLEAR is under way
   Ticket farewell_ticket = 0;
 };

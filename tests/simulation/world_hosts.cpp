@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hosts: when they poll, which commands they send, and whether the results that they get are
-// true.
+// The hosts: when they poll, which commands they send, and whether their results are true.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,7 +25,7 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
     world.note(fmt::format("host {} stop outcome {}", index, static_cast<int>(result.outcome)));
     if (result.outcome == Outcome::confirmed) {
       ++world.report_.stops_confirmed;
-      // An attacker may have guessed the number: the board's datagrams are not signed.
+      // An attacker may have guessed the number, because the board's datagrams are not signed.
       const bool guessed = world.attacker_stops_.count(stop->second.pnum) != 0;
       if (!stop->second.executed && !guessed) world.violate("stop: confirmed but not obeyed");
       leaving = stopper && world.random_.chance(0.5);
@@ -51,8 +50,8 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
     case Outcome::refused:
       ++world.report_.refused;
       sent.dead = true;
-      // If a group was sent command by command, some commands may have been executed before one was
-      // refused.
+      // If a group was sent command by command, some commands may have been executed before a
+      // command was refused.
       if (sent.executed != 0 && !sent.apart) {
         world.violate(fmt::format("truth: command {} refused but executed", id));
       }
@@ -110,7 +109,7 @@ void World::issue_command(int index) {
     host.session->post(setpoints, host.time());
   } else {
     const Time timeout{schedule_.command_timeout_us};
-    // The ticket is known only after send(), which may already transmit.
+    // The ticket is known only after send(), which may already send the command.
     const Ticket ticket = host.session->send(setpoints, timeout, host.time());
     if (ticket != 0) host.tickets[ticket] = id;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Several paths: the places of the hosts on them, the events that hit them, the old datagrams that
-// are replayed on them, and the promises about them.
+// Several paths: the places of the hosts on them, the events that affect them, the old datagrams
+// that are replayed on them, and the promises about paths.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ bool is_fine(const ChannelFaults& faults) {
 
 }  // namespace
 
-// The first host is on all paths, the other hosts on some.
+// The first host is on all paths. The other hosts are on some paths.
 void World::place(Host& host) {
   const bool bus_stopper = host.stopper && schedule_.shared_place;
   for (int w = 0; w < schedule_.paths(); ++w) {
@@ -158,7 +158,7 @@ void World::on_path(std::uint32_t, Source path, bool joined) {
   if (!joined) {
     ++report_.path_losses;
     if (board_->paths().size() == 0) return;
-    // A datagram of this peer has fed, although the peer is no longer a path of the session.
+    // A datagram of this peer has fed, although the peer has left the session's paths.
     std::uint64_t& heard_us = heard_us_[board_->paths()[0].peer];
     heard_us = std::max(heard_us, heard_us_[path.peer]);
     return;
@@ -181,10 +181,9 @@ bool World::serves_since(std::uint64_t at_us) const {
   });
 }
 
-// True if a good path was in use when the command was requested, and for long enough before, so
-// that the host knows that it has control: earlier BUSY have expired, and its F was confirmed. Then
-// the command arrives on that path, and so does the state that confirms it, or the answer to a
-// duplicate.
+// True if a good path was in use when the command was requested, and for so long before that
+// earlier BUSY have expired and the host's F was confirmed. Then the command arrives on this path.
+// The state that confirms the command, or the answer to a duplicate, also arrives on it.
 bool World::should_be_confirmed(const Sent& sent) const {
   const std::uint64_t there_and_back_us =
       2 * most_delay_us + schedule_.settings.state_period_ms() * 1000U;
@@ -199,7 +198,7 @@ void World::check_paths() {
                           host.farewell_ticket == 0 && controls({0, host.incarnation});
   if (serves_since(now_us_)) report_.served_us += now_us_ - looked_us_;
   looked_us_ = now_us_;
-  // True if both ends have used another path for long enough that this path had time to join.
+  // True if no path has been in use for so long that this path had time to join.
   const bool alone = !serves_since(now_us_ - std::min(now_us_, used_again_us));
   const bool crowded = schedule_.attack_interval_us != 0;
   for (int w = 0; w < schedule_.paths(); ++w) {
@@ -237,7 +236,6 @@ void World::on_told_state(int index, std::string_view bytes) {
   path.brought_state = true;
 }
 
-// Checks the age of the newest state that the host has.
 void World::check_age(int index) {
   const Path& path = paths_[index];
   const ReceivedState& state = hosts_.front()->session->state();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The stranger of a random schedule, and the promises about what it cannot do.
+// The stranger of a random schedule, and the promises about the stranger's limits.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ constexpr std::uint64_t slack_of_loss_us = 20'000;
 
 }  // namespace
 
-// The stranger hears all states and heartbeats, as a watcher does, and the answers to its own
+// The stranger receives all states and heartbeats, as a watcher does, and the answers to its own
 // datagrams.
 void World::tell_stranger(std::uint32_t peer, Priority priority, std::string_view bytes) {
   if (schedule_.stranger_interval_us == 0) return;
@@ -26,7 +26,7 @@ void World::tell_stranger(std::uint32_t peer, Priority priority, std::string_vie
   }
 }
 
-// Keeps the T of the newest heartbeats of the board: an echo of an older one does not feed.
+// Keeps the T of the newest heartbeats of the board. An echo of an older T does not feed.
 void World::on_board_heartbeat(std::string_view bytes) {
   constexpr std::size_t most_shown = 64;
   Datagram datagram;
@@ -37,12 +37,12 @@ void World::on_board_heartbeat(std::string_view bytes) {
   if (shown_.size() > most_shown) shown_.erase(shown_.begin());
 }
 
-// The stranger's datagrams arrive whole and at once, some from the address of a host.
+// The stranger's datagrams arrive undamaged and at once. Some come from the address of a host.
 void World::stranger() {
   at(now_us_ + stranger_random_.between(1, 2ULL * schedule_.stranger_interval_us),
      Event::Kind::stranger, 0);
   if (standing_) return;
-  board_->poll(board_ms());  // so that a link lost by silence does not count for the stranger
+  board_->poll(board_ms());  // a link lost by silence must not count for the stranger
   const BoardLink& link = board_->link();
   const bool had_owner = link.has_owner();
   const Process owner = fed_.empty() ? Process() : fed_.back().from;
@@ -105,9 +105,9 @@ void World::on_strangers(const Command& command) {
   if (command.kind == CommandKind::clear) stopped_ = board_->reason() == SafeReason::stop;
 }
 
-// True if this is the newest heartbeat of the host in control, it comes in time, and it echoes a
-// recent heartbeat of the board that is younger than the timeout. False with keys and with
-// standstills, because it is not certain then.
+// True if this is the newest heartbeat of the host in control and it comes in time. It must also
+// echo a recent heartbeat of the board that is younger than the timeout. With keys and with
+// standstills the result is uncertain, so it is false.
 bool World::has_to_feed(const Packet& packet) const {
   if (has_keys() || !schedule_.standstills.empty() || packet.host < 0) return false;
   if (!packet.intact || !packet.heartbeat) return false;
@@ -120,7 +120,6 @@ bool World::has_to_feed(const Packet& packet) const {
          board_ms() - t < board_->settings().timeout_ms;
 }
 
-// Checks that the process in control commanded the live outputs.
 void World::check_owner_of_outputs() {
   const firmware::StepperTarget& stepper = outputs_.stepper[0];
   if (script_ != nullptr || !stepper.enabled || fed_.empty()) return;

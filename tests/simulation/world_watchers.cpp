@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Programs that watch the board, a program that asks for leases in the name of other programs, and
-// the promise about the receivers of the board's states.
+// Programs that watch the board, and a program that requests leases in the name of other programs.
+// Also the promise about the receivers of the board's states.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -45,7 +45,7 @@ void World::watch(Host& watcher, bool over) {
   watcher.die();
 }
 
-// The forger knows the board's clock, and the tokens that were sent to other places.
+// The forger knows the board's clock, and the tokens that were sent to other peers.
 void World::forge_lease() {
   at(now_us_ + random_.between(1, 2ULL * schedule_.forge_interval_us), Event::Kind::forge, 0);
   if (standing_) return;
@@ -103,7 +103,7 @@ void World::on_told(std::uint32_t peer, const Datagram& datagram) {
   newest_token_ = nack.lease;
 }
 
-// Notes a W that may begin or renew a lease at the board.
+// Records a W that may begin or renew a lease at the board.
 void World::on_lease(std::uint32_t peer, std::string_view bytes) {
   Datagram datagram;
   if (schedule_.watchers == 0 || !read_datagram(Text(bytes), datagram)) return;
@@ -128,7 +128,7 @@ void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& 
     violate("watch: a state tells nothing of being safe, and there is no host");
   }
   if (link.has_owner() && board_->paths().has(Source{port, peer})) {
-    // A session that begins in the instant of a state gets a state immediately.
+    // A session that begins at the time of a state gets a state immediately.
     const Streamed now{now_us_, fed_.size()};
     Streamed& before = owner_streamed_[{port, peer}];
     const bool twice = before == now && schedule_.standstills.empty();
@@ -136,11 +136,11 @@ void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& 
     before = now;
     return;
   }
-  if (link.has_owner() && peer == everyone) return;  // another port
+  if (link.has_owner() && peer == everyone) return;  // sent on another port
   if (streamed_us_ != now_us_) streamed_.clear();
   streamed_us_ = now_us_;
   streamed_.insert(peer);
-  // After a standstill a board does several turns in one instant, and a place may change meanwhile.
+  // After a standstill a board runs several turns at once, and the receivers may change meanwhile.
   if (streamed_.size() > 4 && now_us_ != went_on_us_)
     violate("watch: states go to more than four places");
   const auto lease = leases_.find(peer);

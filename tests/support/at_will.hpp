@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Options for a board that is driven without arming, for tests in which arming is not the subject.
+// Options for a board that is driven without arming, for tests of other subjects than arming.
 #pragma once
 
 #include "r4link/options.hpp"

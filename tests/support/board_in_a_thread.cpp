@@ -54,7 +54,7 @@ BoardInAThread::BoardInAThread(const std::vector<std::string>& transports,
 
 BoardInAThread::~BoardInAThread() { switch_off(); }
 
-// The system reuses the number of a pty as soon as no program has it open. A host that waits for
+// The system reuses the number of a pty when all programs have closed it. A host that waits for
 // this board would then find the board of another test.
 void BoardInAThread::switch_off() {
   if (!thread_.joinable()) return;

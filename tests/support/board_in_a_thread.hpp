@@ -18,11 +18,10 @@ namespace r4::test {
 
 class BoardInAThread {
  public:
-  // `transport`: "udp" (a free port of this computer), "pty", or the URL of a CAN bus. `script`:
-  // events of the simulation (firmware/ports/sim/script.hpp).
+  // `transport`: "udp" (a free port on loopback), "pty", or the URL of a CAN bus. `script`: events
+  // of the simulation (firmware/ports/sim/script.hpp).
   explicit BoardInAThread(const std::string& transport, const std::string& script = "")
       : BoardInAThread(std::vector<std::string>{transport}, script) {}
-  // A board on several transports.
   explicit BoardInAThread(const std::vector<std::string>& transports,
                           const std::string& script = "",
                           const std::string& board_id = "test-board");
@@ -30,14 +29,12 @@ class BoardInAThread {
   BoardInAThread(const BoardInAThread&) = delete;
   BoardInAThread& operator=(const BoardInAThread&) = delete;
 
-  // The URL with which a host reaches the board.
   const std::string& url() const { return urls_[0]; }
   const std::vector<std::string>& urls() const { return urls_; }
 
-  // Switches the board off; its transport disappears.
+  // Switches the board off. Its transport disappears.
   void switch_off();
 
-  // Runs `action` in the thread of the board.
   void run(const std::function<void(sim::SimulatedBoard&)>& action);
 
   // True if the board is safe because it has no host, and motor 1 is off.
@@ -45,7 +42,7 @@ class BoardInAThread {
 
   // The commands that the board has executed so far, "O:358,1,1".
   std::vector<std::string> executed();
-  // Waits until the board enters the given state; false after 5 s.
+  // Waits until the board enters the given state. False after 5 s.
   bool wait_for(firmware::BoardState state, SafeReason reason = SafeReason::none);
 
  private:
@@ -61,8 +58,8 @@ class BoardInAThread {
   std::thread thread_;
 };
 
-// Waits until the host has heard that its board is safe for the given reason; false after 5 s. The
-// change may cancel requests of the host that are under way.
+// Waits until `host` reports that its board is safe for the given reason. False after 5 s. The
+// change may cancel commands of the host that are under way.
 bool hears_of(const Board& host, SafeReason reason);
 
 }  // namespace r4::test

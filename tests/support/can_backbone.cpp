@@ -25,7 +25,7 @@ using simulation::Random;
 constexpr std::uint64_t us_ns = 1000;
 constexpr std::uint64_t second_ns = 1000000000;
 constexpr std::uint64_t poll_every_ns = 1000000;
-constexpr std::uint64_t drain_ns = 200000000;  // datagrams on their way at the end may still arrive
+constexpr std::uint64_t drain_ns = 200000000;  // for datagrams under way at the end
 
 struct Message {
   std::string plain;
@@ -34,8 +34,7 @@ struct Message {
   bool heartbeat = false;  // of the host
 };
 
-// Writes the next datagrams of a board and its host, as some hours after the board started to
-// count.
+// Writes the next datagrams of a board and its host, with numbers as some hours after the start.
 class Voice {
  public:
   explicit Voice(std::uint64_t seed) : random_(seed) {
@@ -119,7 +118,7 @@ class Voice {
 };
 
 // One direction of the link of a board: datagrams in, datagrams out. A controller holds at most one
-// frame of it at any time.
+// frame of a stream at any time.
 class Stream {
  public:
   Stream(CanBusModel& bus, const BackboneOptions& options, int from, int to,
@@ -325,8 +324,8 @@ class Backbone {
     });
   }
 
-  // Runs `action` from a random phase to the end of the run; from time 0 if all streams are in
-  // step.
+  // Runs `action` to the end of the run, from a random phase. If all streams are in step, the phase
+  // is 0.
   void every(std::uint32_t hz, std::function<void(std::uint64_t)> action) {
     if (hz == 0) return;
     const std::uint64_t period_ns = second_ns / hz;

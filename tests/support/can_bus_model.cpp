@@ -29,8 +29,8 @@ constexpr std::uint32_t error_frame_bits(bool acknowledge_alone) {
   return (acknowledge_alone ? 6 : 7) + error_delimiter_bits + can_intermission_bits;
 }
 
-// The bits of arbitration as a number: the lowest number wins. An 11-bit id wins against a 29-bit
-// id that begins with it; a data frame wins against a remote request.
+// The bits of arbitration as a number, of which the lowest wins. An 11-bit id wins against a 29-bit
+// id that begins with the same bits. A data frame wins against a remote request.
 std::uint64_t rank(const CanFrame& frame) {
   const std::uint64_t request = frame.remote ? 1 : 0;
   if (!frame.extended) return std::uint64_t{frame.id} << 21 | request << 20;
@@ -118,8 +118,8 @@ CanBusModel::Next CanBusModel::next() const {
   return first;
 }
 
-// Arbitration. If nodes send exactly the same frame, all of them win. Different frames with the
-// same id destroy each other.
+// Arbitration. If nodes send exactly the same frame, all of these nodes win. Different frames with
+// the same id destroy each other.
 void CanBusModel::begin_frame() {
   const std::uint64_t runs = (now_ns_ - recessive_since_ns_) / bits_ns(run_bits);
   std::uint64_t best = never;

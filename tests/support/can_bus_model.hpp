@@ -9,12 +9,12 @@
 //     bus.run_until(1'000'000'000);
 //     bus.load();                             // busy time / time
 //
-// The model follows ISO 11898-1:2015: arbitration by id among the frames that wait when the bus
-// becomes idle (10.4.2.2), the bits of each frame (can_bits.hpp), error frames and retransmission
-// (10.4.4), error counters, error-passive nodes with 8 bits of suspended transmission, bus-off and
-// the return after 128 times 11 recessive bits (12.1.4). The model leaves out bit errors within a
-// frame (every error is an error of the CRC or of the acknowledgement, and all nodes see it),
-// overload frames, clocks that differ, and the propagation delay.
+// The model follows ISO 11898-1:2015. It has arbitration by id among the frames that wait when the
+// bus becomes idle (10.4.2.2), and the bits of each frame (can_bits.hpp). It has error frames and
+// retransmission (10.4.4), error counters, and error-passive nodes with 8 bits of suspended
+// transmission. It has bus-off and the return after 128 times 11 recessive bits (12.1.4). The model
+// leaves out bit errors within a frame, overload frames, clock differences, and the propagation
+// delay. Every error is an error of the CRC or of the acknowledgement, and all nodes see it.
 //
 // Times are nanoseconds from 0. The same options and the same calls give the same run.
 #pragma once
@@ -37,7 +37,7 @@ struct CanBusOptions {
 };
 
 enum class CanQueue : std::uint8_t {
-  mailboxes,  // of the frames that wait, the frame with the lowest id is next
+  mailboxes,  // the waiting frame with the lowest id is next
   fifo,       // the oldest frame is next
 };
 enum class CanNodeState : std::uint8_t { active, passive, bus_off };
@@ -46,11 +46,11 @@ enum class CanBusError : std::uint8_t { damaged, not_acknowledged };
 struct CanNodeOptions {
   CanQueue queue = CanQueue::mailboxes;
   std::size_t room = 3;    // number of frames that can wait
-  bool silent = false;     // only listens: does not acknowledge and does not count errors
+  bool silent = false;     // only receives: does not acknowledge and does not count errors
   bool comes_back = true;  // returns from bus-off without a command
-  // Called at the end of a frame, before its intermission: `sent` after a frame of this node
-  // (before the receivers are called), `received` after a frame of another node, `failed` after an
-  // error frame, and `changed` after a change of state. All nodes see the error frame of a damaged
+  // Called at the end of a frame, before its intermission. `sent`: after a frame of this node,
+  // before the receivers are called. `received`: after a frame of another node. `failed`: after an
+  // error frame. `changed`: after a change of state. All nodes see the error frame of a damaged
   // frame. Only the sender sees the error frame of a missing acknowledgement.
   std::function<void(const CanFrame&)> sent = {};
   std::function<void(const CanFrame&)> received = {};
@@ -70,7 +70,7 @@ class CanBusModel {
   explicit CanBusModel(const CanBusOptions& options) : options_(options), random_(options.seed) {}
 
   int add_node(CanNodeOptions options);
-  // Queues a frame; false if there is no room. Frames stay queued during bus-off.
+  // Queues a frame. False if there is no room. Frames stay queued during bus-off.
   bool send(int node, const CanFrame& frame);
   // All nodes see the next `count` frames damaged.
   void corrupt_next(unsigned count) { corrupt_next_ = count; }
@@ -84,7 +84,7 @@ class CanBusModel {
   // begins when it is allowed.
   void let_come_back(int node, bool comes_back) { to_node(node).options.comes_back = comes_back; }
   void set_errors(int node, unsigned transmit_errors, unsigned receive_errors);
-  // Discards the frames that wait, but not the frame on the bus.
+  // Discards the waiting frames, but not the frame on the bus.
   void clear(int node);
   // Runs `action` at the given time. Actions of the same time run in the order of the calls, before
   // the events of the bus.
@@ -93,7 +93,7 @@ class CanBusModel {
   }
   // Runs all events up to and including the given time.
   void run_until(std::uint64_t time_ns);
-  // The time of the next event; ~0 if there is none.
+  // The time of the next event. ~0: no event.
   std::uint64_t next_ns() const;
 
   std::uint64_t now_ns() const { return now_ns_; }
@@ -157,8 +157,8 @@ class CanBusModel {
   std::map<std::uint32_t, CanIdTraffic> traffic_;
   std::uint64_t now_ns_ = 0;
   std::uint64_t busy_ns_ = 0;
-  std::uint64_t begun_ns_ = 0;            // of the frame on the bus
-  std::uint64_t frame_ends_ns_ = 0;       // of the frame on the bus, before its intermission
+  std::uint64_t begun_ns_ = 0;            // start of the frame on the bus
+  std::uint64_t frame_ends_ns_ = 0;       // end of the frame on the bus, before its intermission
   std::uint64_t free_at_ns_ = 0;          // end of the intermission
   std::uint64_t recessive_since_ns_ = 0;  // the last 11 bits of a frame are always recessive
   unsigned corrupt_next_ = 0;

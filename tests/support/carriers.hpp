@@ -11,7 +11,7 @@
 
 namespace r4::test {
 
-// Is up while it is open. Discards what is sent, and receives nothing.
+// A carrier that is up while it is open. It discards sent datagrams and receives none.
 class IdleCarrier : public Carrier {
  public:
   void open(Handler& handler) override {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated board on UDP that a Board controls.
 #pragma once
 
 #include <gtest/gtest.h>

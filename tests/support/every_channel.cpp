@@ -10,7 +10,7 @@ namespace r4::test {
 
 namespace {
 
-constexpr std::chrono::seconds channel_patience{10};  // long enough for a busy computer
+constexpr std::chrono::seconds channel_patience{10};  // long enough for a busy machine
 
 sim::Pins pins_of(const ControlledBoard& board) {
   sim::Pins pins;
@@ -18,7 +18,7 @@ sim::Pins pins_of(const ControlledBoard& board) {
   return pins;
 }
 
-// The first state for which `is_so` is true; the last state if there is none.
+// The first state for which `is_so` is true. The last state if there is no such state.
 State await(const ControlledBoard& board, const std::function<bool(const State&)>& is_so) {
   State state;
   for (int tries = 0; tries < 1000; ++tries) {
@@ -143,7 +143,6 @@ void expect_steppers(const ControlledBoard& board) {
   }
 }
 
-// A motor runs, and relay 1 is closed.
 void drive(const ControlledBoard& board) {
   board.command("R:1,On");
   board.command("O:500,1,1");
@@ -203,7 +202,7 @@ void expect_every_channel(const ControlledBoard& board) {
   expect_steppers(board);
   board.command("E:STOP");
   await(board, [](const State& s) { return s.safe == SafeReason::stop; });
-  // The pulses of the steppers have ended; the model detects that after a pause.
+  // The pulses of the steppers have ended. The model detects their end after a pause.
   const State stopped = board.next_state();
   await(board, [&](const State& s) {
     return s.t_ms - stopped.t_ms > sim::BoardModel::stepper_pause_ms + 20;

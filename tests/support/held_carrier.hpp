@@ -17,7 +17,6 @@ namespace r4::test {
 
 class Hold {
  public:
-  // Makes a transport for the given URL.
   CarrierMaker at(const std::string& url) {
     return [turn = turn_, url](Loop& loop) {
       return std::make_unique<Held>(standard_registry().make(context_of(loop), url, Role::host),
@@ -30,7 +29,7 @@ class Hold {
   void release() { turn_->reach(Turn::Stage::released); }
 
  private:
-  // Shared, so that it lives as long as both threads use it.
+  // Shared, so that it exists while either thread uses it.
   class Turn {
    public:
     enum class Stage : std::uint8_t { free, wanted, held, released };

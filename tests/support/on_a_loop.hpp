@@ -20,7 +20,7 @@ struct OnALoop {
     io.restart();
     while (!done()) {
       if (std::chrono::steady_clock::now() > deadline) return false;
-      // If the loop has nothing to wait for, nothing can change.
+      // If the loop waits for nothing, the result cannot change.
       if (io.run_one_for(std::chrono::seconds{10}) == 0 && io.stopped()) return done();
     }
     return true;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Checks of errors for tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,7 +9,6 @@
 
 namespace r4::test {
 
-// The problem that `action` throws.
 template <class Action>
 Problem problem_of(Action action) {
   try {

@@ -45,7 +45,7 @@ class RandomWiring {
     wiring_.places[signal].byte = static_cast<std::uint8_t>(number);
   }
 
-  // One of the places for each signal of these kinds.
+  // Gives each signal of these kinds one of the places.
   void deal(const std::vector<SignalKind>& kinds, std::vector<int> places) {
     for (const SignalKind kind : kinds) {
       for (int i = 0; i < row_of(kind).channels; ++i) {
@@ -99,7 +99,7 @@ class RandomWiring {
     }
   }
 
-  // Two lines of a chip for each motor, not too far from each other.
+  // Gives each motor two lines of a chip, not too far from each other.
   void choose_lines() {
     std::vector<int> free = numbers(0, 2 * pca9685_lines);
     for (const auto& [pwm, direction] :
@@ -136,7 +136,7 @@ class RandomWiring {
       wiring_.places[i] = {};
       wiring_.places[row_of(row.partner).first + i - row.first] = {};
     }
-    // Of a pair, the second may be left out without the first.
+    // In a pair, the second signal may be left out without the first.
     for (int i = 0; i < signal_count; ++i) {
       const SignalRow& row = row_of(signal_kind(i));
       const int partner = row_of(row.partner).first + i - row.first;

@@ -7,8 +7,8 @@
 
 namespace r4::test {
 
-// A wiring without a fault: each signal at any place that it can have, with any option. Now and then
-// a chip is not fitted or a signal is not connected. The same seed gives the same wiring.
+// A wiring without a fault: each signal at any place that it can have, with any option. Sometimes a
+// chip is not fitted or a signal is not connected. The same seed gives the same wiring.
 Wiring random_wiring(std::uint64_t seed);
 
 }  // namespace r4::test

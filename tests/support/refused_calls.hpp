@@ -22,7 +22,7 @@ namespace r4::test {
 struct RefusedCall {
   long number;
   int error;
-  // if set, only calls with this second argument are refused
+  // If set, only calls with this second argument are refused.
   std::optional<std::uint32_t> second_argument;
 };
 
@@ -31,7 +31,7 @@ inline const RefusedCall no_watches{SYS_epoll_ctl, ENOSPC, EPOLL_CTL_ADD};
 // The user has reached the limit of threads (ulimit -u).
 inline const RefusedCall no_threads{SYS_clone3, EAGAIN, std::nullopt};
 
-// From now on the kernel refuses the call to this thread. This cannot be undone.
+// From now on the kernel refuses the call to this thread. The refusal ends only with the thread.
 inline void refuse(const RefusedCall& call) {
   const auto load = [](std::size_t offset) {
     return sock_filter(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offset)));
@@ -54,7 +54,6 @@ inline void refuse(const RefusedCall& call) {
   ASSERT_EQ(::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program), 0);
 }
 
-// Runs a test that refuses calls in a thread, because the refusal ends only with the thread.
 inline void in_a_thread_of_its_own(const std::function<void()>& test) { std::thread(test).join(); }
 
 }  // namespace r4::test

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Compares the sampling times that states report with the true times, over a real transport. The
-// simulated board uses the clock of this computer, so the true time is known to some microseconds.
+// simulated board and the test use one clock, so the true time is known to some microseconds.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ struct SampledTruth {
   std::size_t states = 0;     // states with a reported error
   std::size_t dishonest = 0;  // states whose true error was larger than the reported error
   ReceivedState::Clock::duration bound = ReceivedState::unknown;  // the last reported error
-  // Of the last states, after the reported error was small enough.
+  // Errors of the last states, after the reported error was small enough.
   ReceivedState::Clock::duration median_error{}, worst_error{};
 };
 

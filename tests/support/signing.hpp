@@ -14,7 +14,6 @@ namespace r4::test {
 // The bytes first, first + 1 …
 Key key_of(std::uint8_t id, std::uint8_t first = 0);
 
-// The default settings with these keys.
 template <class... Keys>
 Settings settings_with(const Keys&... keys) {
   Settings settings;

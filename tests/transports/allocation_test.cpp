@@ -10,7 +10,6 @@
 namespace r4::test {
 namespace {
 
-// Answers each datagram with another datagram.
 class Player final : public Carrier::Handler {
  public:
   void on_datagram(std::string_view, Peer from) override {

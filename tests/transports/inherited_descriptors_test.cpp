@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A child process inherits no descriptor of a transport, because it would keep the port while it
-// runs.
+// A child process inherits no descriptor of a transport, because the descriptor would keep the port
+// open.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -75,12 +75,12 @@ class Recorder final : public Carrier::Handler {
   int drained = 0;
   std::vector<std::string> overheard;
   std::vector<std::string> oversize;
-  std::function<void(const Datagram&)> then;  // also called
-  std::function<void()> then_event;           // also called
-  std::function<void()> then_overheard;       // also called
+  std::function<void(const Datagram&)> then;  // called after the datagram is recorded
+  std::function<void()> then_event;           // called after the event is recorded
+  std::function<void()> then_overheard;       // called after the overheard datagram is recorded
 };
 
-// Runs the loop until `done()`; false if `done()` is still false after `limit`.
+// Runs the loop until `done()`. False if `done()` is false after `limit`.
 template <class Done>
 [[nodiscard]] bool run_until(asio::io_context& io, Done done, Clock::duration limit = patience) {
   const auto deadline = Clock::now() + limit;
@@ -88,7 +88,7 @@ template <class Done>
   while (!done()) {
     const auto now = Clock::now();
     if (now >= deadline) return false;
-    // If the loop has nothing to wait for, nothing can change.
+    // If the loop waits for nothing, the result cannot change.
     if (io.run_one_for(deadline - now) == 0 && io.stopped()) return done();
   }
   return true;
@@ -104,7 +104,6 @@ inline double in_milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
 
-// Opens a carrier by URL.
 inline std::unique_ptr<Carrier> open_carrier(asio::io_context& io, const std::string& url,
                                              Role role, Recorder& recorder) {
   auto carrier = Registry::standard().make(io, url, role);
@@ -112,7 +111,7 @@ inline std::unique_ptr<Carrier> open_carrier(asio::io_context& io, const std::st
   return carrier;
 }
 
-// The Error that `action` throws; none if it does not throw an Error.
+// The Error that `action` throws. None if it throws no Error.
 template <class Action>
 std::optional<Error> error_of(Action action) {
   try {
@@ -123,13 +122,12 @@ std::optional<Error> error_of(Action action) {
   return std::nullopt;
 }
 
-// The number of open file descriptors of this process.
 std::size_t open_descriptors();
 
-// Runs `action` in a child process and returns its exit status; 126 if a signal ended it.
+// Runs `action` in a child process. Returns its exit status, or 126 if a signal ended it.
 int run_in_child(const std::function<int()>& action);
 
-// The same as user nobody, without privileges.
+// Like run_in_child(), as user nobody without privileges.
 int run_unprivileged(const std::function<int()>& action);
 
 }  // namespace r4::test

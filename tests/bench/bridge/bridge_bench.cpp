@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cost of `r4 bridge`, compared with a bare forwarder that only polls, reads and writes. Both
-// are separate processes that run at the same time and are measured in turns.
+// The cost of `r4 bridge`, compared with a bare forwarder that only polls, reads and writes. Bridge
+// and forwarder are separate processes that run at the same time and are measured in turns.
 //
 //     r4_bridge_bench [R4, default build/r4] [datagrams, default 4000]
 //
 // Exit code 1 if a limit is missed. UDP to a pty and back with datagrams of 170 bytes: at most 1.15
-// times the forwarder's median one-way time, and 1.3 times its processor time. UDP to UDP: 100,000
-// datagrams a second, none reordered.
+// times the forwarder's median one-way time, and at most 1.3 times its processor time. UDP to UDP:
+// at least 100,000 datagrams a second, none reordered.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -159,7 +159,7 @@ class Forwarder {
     require(false, r4.c_str());
   }
 
-  // Forwards between a socket and `board`. `line_end`: `board` is a stream, so add line ends.
+  // If `line_end`, `board` is a stream, so add line ends.
   void run_bare(std::uint16_t port, int board, bool line_end) {
     std::fflush(stdout);
     pid_ = ::fork();
@@ -218,7 +218,7 @@ struct Path {
   std::array<std::vector<double>, 2> took_us{};  // index 0: to the board, 1: to the host
   std::array<double, 2> cpu_us{};
 
-  // Sends one datagram and waits for it. False if it does not arrive within `limit_ms`.
+  // Sends one datagram and waits for it. False if the datagram does not arrive within `limit_ms`.
   bool carry(bool to_host, int limit_ms, double* took) {
     std::string bytes = datagram(to_host, ++number);
     const std::size_t expected = bytes.size();
@@ -239,7 +239,7 @@ struct Path {
     return true;
   }
 
-  // Waits until the forwarder works.
+  // Waits until the forwarder forwards in both directions.
   void begin() {
     double ignored = 0;
     for (int i = 0; i < 100; ++i) {
@@ -329,7 +329,7 @@ void flood(const std::string& r4, bool to_host, std::uint32_t count) {
   sockaddr_in back{};
   socklen_t size = sizeof back;
   bool there = false;
-  for (int i = 0; i < 100 && !there; ++i) {  // the board's socket learns the address of the bridge
+  for (int i = 0; i < 100 && !there; ++i) {  // the board's socket gets the bridge's address
     const std::string heartbeat = datagram(false, 0);
     if (::write(host.number(), heartbeat.data(), heartbeat.size()) < 0) continue;
     pollfd end{board.number(), POLLIN, 0};

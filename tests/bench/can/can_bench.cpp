@@ -6,13 +6,13 @@
 //                  [part: round-trip or throughput]]
 //
 // Round trip: a command and the state that answers it. The reference is a pair of blocking sockets
-// with messages of the same sizes; then our carriers replace the sockets. Throughput: datagrams of
+// with datagrams of the same sizes. Then our carriers replace the sockets. Throughput: datagrams of
 // 170 bytes in one direction. Our two ends use the packed form, the default, which needs fewer
-// frames for the same datagrams; the kernel carries the plain datagrams. Both take turns. A ratio
-// is that of one round, and the median of all rounds counts. Exit code 1 if a limit is missed:
+// frames for the same datagrams. The kernel carries the plain datagrams. The kernel and our stack
+// take turns. The median of the ratios of all rounds counts. Exit code 1 if a limit is missed:
 // round trip p50 at most 1.2 times the kernel's, throughput at least the kernel's.
 //
-// Also measured without a limit, to show where the time is spent: our plain form (pack=0); bare
+// Also measured, without a limit, to show where the time is spent: our plain form (pack=0); bare
 // frames, the best that a program with its own ISO-TP can reach; async_send, with the whole stack
 // above the carriers and simulated chips on the board.
 #include <algorithm>
@@ -80,8 +80,8 @@ void run_until(asio::io_context& io, Done done) {
   }
 }
 
-// A state of the board, filled up to 170 bytes by its packet number, because not every checksum has
-// eight digits.
+// A state of the board, filled up to 170 bytes by its packet number, because some checksums have
+// fewer than eight digits.
 std::string make_datagram() {
   constexpr Text fields(
       "AIN24:24.28;AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;"
@@ -107,8 +107,7 @@ std::string make_command() {
 
 // --- round trip
 
-// Sends commands one after the other. Each is sent after the state that confirms its predecessor
-// has come.
+// Sends each command after the state that confirms the command before it.
 class Host {
  public:
   explicit Host(const std::string& url) : board_(io_, url, test::at_will()) { board_.open(); }
@@ -138,7 +137,7 @@ class Host {
   struct Confirmed {
     Host& host;
     void operator()(const CommandResult& result) const {
-      // A lost state is not repeated while the board's clock stands still.
+      // While the board's clock is stopped, a lost state is not repeated.
       if (result.outcome == Outcome::confirmed) {
         host.seconds_.push_back(seconds_since(host.start_));
         --host.left_;
@@ -222,7 +221,6 @@ std::vector<double> kernel_round_trips(test::KernelIsotp& dialogue, test::Kernel
 struct Ours {
   explicit Ours(Form which) : form(which), board(which), host(host_url(which)) {}
 
-  // The times of one round.
   std::vector<double> measure() {
     board.let_time_pass(true);
     host.await_control();
@@ -301,7 +299,6 @@ std::size_t packed_size(const std::string& datagram) {
   return pack(Text(datagram.data(), datagram.size()), bytes, sizeof bytes);
 }
 
-// The receiving end of our stack.
 class Receiver : Carrier::Handler {
  public:
   Receiver(Form form, Lane lane)

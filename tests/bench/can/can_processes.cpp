@@ -28,7 +28,6 @@ using namespace std::chrono_literals;
 constexpr std::uint32_t unused_id = 0x7FF;
 constexpr char pass_time = 'p', hold_time = 'h', tell_sent = 's';
 
-// A carrier's handler that ignores everything.
 struct Deaf : Carrier::Handler {
   void on_datagram(std::string_view, Peer) override {}
   void on_carrier_event(const CarrierEvent&) override {}
@@ -87,8 +86,8 @@ void CanBoardProcess::serve(Form form) const {
   sim::SimulatedBoard* running = nullptr;
 
   sim::SimulatedBoard::Options options;
-  options.settings.timeout_ms = 10000;  // in a clock that runs too fast at times
-  // with a high rate, the clock must advance less time per trip
+  options.settings.timeout_ms = 10000;  // the clock runs too fast at times
+  // With a high rate, the clock advances less time per trip.
   options.settings.state_rate_hz = 1000;
   options.settings.pack = form == Form::packed;
   options.clock_ms = [&] { return clock_ms; };
@@ -240,7 +239,7 @@ void CanSenderProcess::serve_ours(Form form, Lane lane, const std::string& datag
       if (received >= count) break;
       if (received != seen) since = Clock::now();
       seen = received;
-      // Repeat lost datagrams: an emulated processor may miss the times of ISO-TP.
+      // Repeat lost datagrams: an emulated processor may exceed the timeouts of ISO-TP.
       if (Clock::now() - since > 200ms) sent = received;
       const bool room = sent < count && sent - received < ahead;
       if (room && carrier->send(datagram, Priority::normal) == SendResult::sent) {

@@ -13,27 +13,28 @@
 
 namespace r4::bench {
 
-// The nodes on the bus; can_ids.hpp defines the ids of each.
+// The nodes on the bus. can_ids.hpp defines their ids.
 constexpr std::uint8_t kernel_node = 6;
 
 // The form of our datagrams. The kernel's end carries plain datagrams in both cases.
 enum class Form { plain, packed };
 const char* to_text(Form form);
-// The user of a carrier: a session and a board, or only the benchmark. Each has separate nodes.
+// The user of a carrier: a session and a board, or only the benchmark. Each user has separate
+// nodes.
 enum class Above { all, nothing };
 std::string host_url(Form form, Above above = Above::all);
 std::string board_url(Form form,
-                      Above above = Above::all);  // a URL does not contain whether a board packs
+                      Above above = Above::all);  // a URL does not say if a board packs
 
-// The kernel's sockets for the two lanes of a node, from either end.
+// The kernel's sockets for the two lanes of a node, for either end.
 test::KernelIsotp kernel_dialogue(bool board);
 test::KernelIsotp kernel_telemetry(bool board);
 
-// A simulated board whose clock stands still while a round trip is measured. Each command that it
-// executes advances the clock to the time of the next state, which confirms the command.
+// A simulated board whose clock stops while a round trip is measured. Each command that it executes
+// advances the clock to the time of the next state, which confirms the command.
 class CanBoardProcess : public ChildProcess {
  public:
-  // Datagrams that passed, in the plain form that the program uses.
+  // The datagrams sent, in the plain form that the program uses.
   struct Passed {
     std::uint64_t datagrams = 0, bytes = 0;
     Passed operator-(const Passed& before) const {
@@ -61,12 +62,11 @@ class CarrierEchoProcess : public ChildProcess {
   [[noreturn]] static void serve(Form form, const std::string& state, int ready);
 };
 
-// Answers each datagram of the dialogue with a telemetry datagram of the length that the question
-// names.
+// Answers each datagram of the dialogue with a telemetry datagram of the length that the datagram
+// requests.
 class KernelEchoProcess : public ChildProcess {
  public:
   KernelEchoProcess();
-  // A question of `size` bytes.
   static std::string question(std::size_t size, std::uint16_t answer_size);
 };
 
@@ -76,13 +76,11 @@ enum class Lane { telemetry, dialogue };
 // receiver, so that no datagram is lost. The receiver reports each datagram to the sender.
 constexpr std::uint32_t ahead = 8;
 void await_room(const SharedCount& received, std::uint32_t sent);
-// The number of datagrams that a sender sends next.
 std::uint32_t next_count(int control);
 
-// Sends datagrams as fast as possible.
 class CanSenderProcess : public ChildProcess {
  public:
-  // On our stack, or without a form on the kernel's.
+  // On our stack; without a form, on the kernel's.
   CanSenderProcess(std::optional<Form> ours, Lane lane, const std::string& datagram);
 
   void begin(std::uint32_t count) const;

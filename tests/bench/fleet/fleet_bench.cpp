@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cost of a fleet, measured for several numbers of boards: simulated boards in a separate
-// process, over UDP, at 100 Hz each, with r4::Fleet on one core.
+// The cost of a fleet, for several numbers of boards. The boards are simulated in a separate
+// process and send states over UDP at 100 Hz each. r4::Fleet runs on one core.
 //
 //     r4_fleet_bench [boards, default 1, 10, 100 and 1000] [seconds, default 5]
-//     r4_fleet_bench INTERFACE [seconds]      eight boards on a CAN bus, at 1000 Hz or as fast as
-//                                             possible: a fleet, which has one socket, compared
-//                                             with eight Boards, which have one socket each
+//     r4_fleet_bench INTERFACE [seconds]
+//
+// The second form compares a fleet of eight boards on a CAN bus, which has one socket, with eight
+// Boards, which have one socket each. The boards send states at 1000 Hz, or as fast as the bus
+// allows.
 //
 // Exit code 1 if a limit is missed. With a thousand boards: no datagram is lost. A datagram costs
-// the host no heap and at most 1.25 times the datagram of one board as fast as possible. A board
-// costs the host at most 24 kB. A simulated board costs 64 kB and 6 us a state. The silence of one
-// board is noticed at most 20 ms later than with one board.
+// the host no heap. It costs at most 1.25 times the time of a datagram of one board that sends as
+// fast as possible. A board costs the host at most 24 kB. A simulated board costs at most 64 kB,
+// and 6 us a state. The host notices the silence of one board at most 20 ms later than with one
+// board.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -83,7 +86,6 @@ class BoardsProcess : public ChildProcess {
   }
   explicit BoardsProcess(std::size_t count)
       : BoardsProcess(std::vector<std::string>(count, "udp://127.0.0.1:0"), 100) {}
-  // The URLs of boards over UDP, for their host.
   std::vector<std::string> urls() const {
     std::vector<std::string> urls;
     for (const std::uint16_t port : ports_) {
@@ -92,7 +94,7 @@ class BoardsProcess : public ChildProcess {
     return urls;
   }
   BoardsUsage usage() const { return ask('u'); }
-  // The first board falls silent. Returns the time of that.
+  // Makes the first board silent, and returns the time.
   Clock::time_point silence() const { return ask('s').now; }
 
  private:
@@ -148,7 +150,7 @@ class BoardsProcess : public ChildProcess {
   std::vector<std::uint16_t> ports_;
 };
 
-// Microseconds per datagram of one board as fast as possible.
+// Microseconds per datagram of one board that sends as fast as possible.
 double alone_us() {
   BoardProcess process(Transport::udp, true);
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
@@ -221,7 +223,7 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
   const std::uint64_t lost = after.lost - before.lost;
   const auto length = static_cast<double>(seconds.count());
 
-  // The time until the last post was sent, and the time of a stop until the last board has
+  // The time until the last post is sent, and the time from a stop until the last board has
   // confirmed it.
   const auto posting = Clock::now();
   std::vector<BoardSetpoints> setpoints;
@@ -239,7 +241,6 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
               received / length, static_cast<unsigned long long>(lost), host_us,
               host_us / reference_us, cpu_s / length * 100, host_kb, board_us,
               boards_after.kb_a_board, post_ms, stop_ms, stopped ? "" : "!", notice_ms);
-  // The timers of Asio and the queue of events grow occasionally.
   if (heap != 0) std::printf("       %llu allocations\n", static_cast<unsigned long long>(heap));
   static const double alone_ms = notice_ms;
   if (count < 1000) return;
@@ -258,7 +259,7 @@ struct Counts {
   std::uint64_t received = 0, lost = 0;
 };
 
-// The datagrams of `counts()` and the processor time within this time.
+// Prints the datagrams of `counts()` and the processor time within this time.
 void measure_bus(const char* what, const BoardsProcess& boards, std::chrono::seconds seconds,
                  const std::function<Counts()>& counts) {
   std::this_thread::sleep_for(1s);
@@ -270,7 +271,7 @@ void measure_bus(const char* what, const BoardsProcess& boards, std::chrono::sec
   const Counts after = counts();
   const std::uint64_t sent = boards.usage().sent - sent_before;
   const auto received = static_cast<double>(after.received - before.received);
-  // A datagram that was counted as lost may come late.
+  // A datagram that is counted as lost may arrive late.
   std::printf("%-22s %9.0f %9.0f %8lld %10.2f\n", what,
               static_cast<double>(sent) / static_cast<double>(seconds.count()),
               received / static_cast<double>(seconds.count()),

@@ -78,7 +78,7 @@ void BoardProcess::serve(Transport path, bool unbound) {
   sim::SimulatedBoard::Options options;
   if (unbound) {
     options.clock_ms = [&] { return virtual_ms; };
-    options.settings.timeout_ms = 10000;  // in a clock that runs a hundred times too fast
+    options.settings.timeout_ms = 10000;  // the clock runs a hundred times too fast
     options.settings.heartbeat_ms = 500;
     options.settings.state_rate_hz = 1000;
   }

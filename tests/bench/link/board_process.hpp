@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The other ends of the benchmarks, each in a separate process: a simulated board, and a plain
-// program that answers every packet or line, the reference for the board's round trip. Both are
-// forked: construct them before the first thread.
+// program that answers every packet or line, the reference for the board's round trip. The
+// processes are forked, so construct them before the first thread.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,8 @@ Usage own_usage();
 enum class Transport { udp, pty };
 const char* to_text(Transport path);
 
-// A simulated board. With `unbound` its clock runs as fast as possible, so that it sends states as
-// fast as possible instead of at 1000 Hz.
+// A simulated board that sends states at 1000 Hz. If `unbound`, its clock runs as fast as possible,
+// and so does its stream of states.
 class BoardProcess : public ChildProcess {
  public:
   BoardProcess(Transport path, bool unbound);
@@ -35,7 +35,7 @@ class BoardProcess : public ChildProcess {
   std::string url_;
 };
 
-// Answers each packet (line) with `answer_size` bytes, with blocking calls only.
+// Answers each packet or line with `answer_size` bytes, with blocking calls only.
 class EchoProcess : public ChildProcess {
  public:
   EchoProcess(Transport path, std::size_t question_size, std::size_t answer_size);

@@ -15,7 +15,7 @@
 namespace r4::bench {
 namespace {
 
-// The first or second of the cores that this process had at its start, if it had two.
+// Uses the first or second of the cores that this process had at its start, if it had two.
 void run_on_core(int index) {
   static const cpu_set_t all = [] {
     cpu_set_t set;

@@ -11,8 +11,8 @@
 
 namespace r4::bench {
 
-// The cores of the two processes: one core each, or a shared core. Otherwise the scheduler moves
-// between the two, and the difference is greater than the effects that are measured.
+// The cores of the two processes: one core each, or a shared core. Without a placement, the
+// scheduler moves a process between cores, which costs more than the effects that are measured.
 enum class Placement { two_cores, one_core };
 const char* to_text(Placement placement);
 // Applies to this process, and to processes that are forked later.
@@ -20,7 +20,6 @@ void place(Placement placement);
 
 // Ends the process with perror(what) if not `ok`.
 void require(bool ok, const char* what);
-// Writes all bytes, however long that takes.
 void write_all(int fd, const void* data, std::size_t size);
 void read_all(int fd, void* data, std::size_t size);
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The link between two processes: round trip compared with a plain ping-pong, heap, and streaming.
+// The link between two processes: round trip compared with a plain ping-pong, allocations, and
+// streaming.
 //
 //     r4_link_bench [round-trips a path, default 20000 [part: round-trip, heap or stream]]
 //
-// The three ways of asking take turns in blocks, so that other load of the machine affects all of
-// them. Exit code 1 if a limit is missed: asynchronous p50 at most 1.3 times the plain p50, each
+// The plain program and async_send take turns in blocks, so that other load of the machine affects
+// both. Exit code 1 if a limit is missed: asynchronous p50 at most 1.3 times the plain p50, each
 // process on a separate core; no allocation per datagram; at 100 Hz at most 2 % of a core on either
 // side.
 #include <algorithm>
@@ -47,7 +48,6 @@ Percentiles percentiles(std::vector<double>& seconds) {
   return {seconds[seconds.size() / 2] * 1e6, seconds[seconds.size() * 99 / 100] * 1e6};
 }
 
-// A board and its loop, in this thread.
 struct AsyncHost {
   explicit AsyncHost(const std::string& url) : board(io, url, test::at_will()) {
     board.open();
@@ -71,7 +71,7 @@ struct AsyncHost {
     timer.async_wait([&](const std::error_code&) { over = true; });
     while (!over) io.run_one();
   }
-  // Asks `count` questions one after the other; appends the seconds that each took.
+  // Sends `count` commands one after another and appends the seconds that each command took.
   void round_trips(int count, std::vector<double>& seconds) {
     int left = count;
     Clock::time_point start;
@@ -98,12 +98,12 @@ struct AsyncHost {
     io.restart();
   }
 
-  // One thread only, so Asio needs no locks.
+  // Only one thread uses it, so Asio needs no locks.
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   AsyncBoard board;
 };
 
-// --- (a)
+// --- round trip
 
 void compare_round_trips(Transport path, int count, bool judged) {
   // Sizes of Q:ID and of the simulated board's answer, as sent; a line ends with CR LF.
@@ -143,7 +143,7 @@ void compare_round_trips(Transport path, int count, bool judged) {
               b.p50, b.p99, b.p50 / r.p50);
 }
 
-// --- (b)
+// --- allocations
 
 void print_allocations(Transport path, const char* what, std::uint64_t host, std::uint64_t board,
                        std::uint64_t datagrams) {
@@ -242,7 +242,7 @@ void count_allocations(Transport path) {
   BoardProcess other(path, false);
   Board board(other.url(), test::at_will());
   board.wait_active();
-  for (int i = 0; i < 300; ++i) {  // after this the deques of the loop have their final size
+  for (int i = 0; i < 300; ++i) {  // until the deques of the loop have their final size
     board.post(Command::osmc(1, Pwm(i), Direction::forward));
     if (i % 10 == 0) board.next_state();
   }
@@ -257,7 +257,7 @@ void count_allocations(Transport path) {
                     other.usage().allocations - board_before.allocations, 1100);
 }
 
-// --- (c)
+// --- streaming
 
 void stream(Transport path, int rate_hz) {
   const bool unbound = rate_hz == 0;

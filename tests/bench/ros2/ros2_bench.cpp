@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The time of a state from the link to a ROS 2 subscriber, compared with a sample of the same size
-// that a program with Cyclone DDS alone writes.
+// The time of a state from the link to a ROS 2 subscriber. The reference is a sample of the same
+// size that a program with only Cyclone DDS writes.
 //
 //     r4_ros2_bench [SAMPLES]      exit code 1 if a state takes more than 1.3 times as long
 //
-// Two processes on loopback. One publishes all topics of a board through the outbox, as r4 ros2
-// does; the other subscribes. Every 5 ms a state and a plain sample are sent in turns. Each carries
-// the time at which it was ready.
+// Two processes on loopback. One process publishes all topics of a board through the outbox, as r4
+// ros2 does. The other process subscribes. A state and a plain sample take turns, 5 ms apart. Each
+// carries the time at which it was ready.
 #include <dds/dds.h>
 #include <fmt/format.h>
 #include <sys/wait.h>

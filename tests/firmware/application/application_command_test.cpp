@@ -101,7 +101,7 @@ TEST_F(ApplicationCommand, AnEchoOfAnotherBootStartsNoSession) {
 
 TEST_F(ApplicationCommand, ACommandRefusedInAnOutageStaysRefused) {
   board.run(1500);
-  const std::uint32_t overtaken = host.pnum++;  // a heartbeat that arrives after the command
+  const std::uint32_t overtaken = host.pnum++;  // of a heartbeat that arrives after the command
   const std::uint32_t refused = host.command("O:1,1,1");
   EXPECT_EQ(answers(), Lines{"SAFE"});
   board.receive("H:ROS2-R4;" + test::stamp_of(our_session, overtaken, board.newest_t()), host.at);
@@ -187,7 +187,6 @@ TEST_F(ApplicationCommand, LimitsIdentityAnswersToUnprovenHosts) {
   EXPECT_EQ(board.take(MessageKind::identity).size(), 1U) << "the controlling host gets its answer";
 }
 
-// However many hosts send a stop, each of them gets the answer that proves it.
 TEST_F(ApplicationCommand, ObeysAndAnswersEveryStop) {
   for (std::uint32_t peer = 1000; peer < 2000; ++peer) {
     board.take();
@@ -215,7 +214,7 @@ TEST_F(ApplicationCommand, TheIdentityReportsWhetherAnotherHostHasControl) {
   const Source stranger{0, 99};
   EXPECT_NE(identity(stranger).find(";BUSY:1;"), std::string::npos);
   EXPECT_NE(identity(host.at, host.sid).find(";BUSY:0;"), std::string::npos);
-  board.run(1500);  // the link is lost: any host may take control
+  board.run(1500);  // the link is lost, so any host may take control
   EXPECT_NE(identity(stranger).find(";BUSY:0;"), std::string::npos);
 }
 
@@ -236,7 +235,6 @@ TEST_F(ApplicationCommand, IgnoresDatagramsOfOtherBoards) {
   }
   EXPECT_EQ(board.take(MessageKind::nack).size(), 0U);
   EXPECT_EQ(board.log.executed.size(), 0U);
-  // Such datagrams do not keep the link alive either.
   board.run(900);
   board.receive("H:R4-ROS2;PNum:1;T:1;", host.at);
   board.run(100);

@@ -21,7 +21,7 @@ class ApplicationDevices : public testing::Test {
  protected:
   ApplicationDevices() { host.connect(); }
 
-  // Milliseconds, with heartbeats that echo the board's time if `echoes`.
+  // Advances the time; if `echoes`, with heartbeats that echo the board's time.
   void pass(std::uint32_t ms, bool echoes = true) {
     for (; ms != 0; --ms) {
       devices.bus.advance(1000);

@@ -65,7 +65,7 @@ TEST_F(ApplicationFarewell, DoesNotEndTheNextSessionIfLateOrRepeated) {
   EXPECT_EQ(answers(), (Lines{"DUPLICATE"})) << "the host learns that its farewell was executed";
   board.run(1);
   TestHost next(board, another_session,
-                host.at);  // the numbers of this session are such that the old farewell would fit
+                host.at);  // the old farewell would fit the numbers of this session
   next.connect();
   next.command("O:358,1,1");
   forget();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A group of commands in one datagram: the board executes all of them in one step, or none.
+// A group of commands in one datagram: the board executes all commands in one step, or no command.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -10,7 +10,7 @@ namespace {
 using Lines = std::vector<std::string>;
 
 struct ApplicationGroup : test::BoardInControl {
-  // The answers, each with the command that it names: "FORMAT AT:2".
+  // The answers, each with the command that it refuses: "FORMAT AT:2".
   Lines refusals() {
     Lines lines;
     for (const test::Heard& heard : board.take(MessageKind::nack)) {
@@ -91,7 +91,7 @@ TEST_F(ApplicationGroup, IsExecutedOnceAndInOrder) {
   host.resend("P:2,1;P:2,2", late);
   EXPECT_EQ(refusals(), (Lines{"DUPLICATE", "STALE"}));
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>(2, number));
-  // Without a number, the board could not execute it exactly once.
+  // Without a number, the board could not execute the group exactly once.
   board.receive("O:1,1,1;O:1,1,2;T:1;", host.at);
   board.receive("O:1,1,1;O:1,1,2;PNum:5;T:1;", Source{0, 9});
   EXPECT_EQ(refusals(), Lines{"BUSY"});
@@ -123,8 +123,8 @@ TEST_F(ApplicationGroup, StopsTheBoardIfItContainsAStop) {
   }
 }
 
-// Closing the supply moves nothing (docs/reference/safety.md), but a command after it in the group
-// does.
+// Closing the supply moves nothing (docs/reference/safety.md), but a later command of the group
+// moves an output.
 TEST_F(ApplicationGroup, AppliesItsCommandsInOrder) {
   host.command("O:358,1,1;R:1,On");
   EXPECT_EQ(board.outputs().relays, 1);

@@ -19,7 +19,6 @@ using Lines = std::vector<std::string>;
 
 const Key key = key_of(1);
 
-// A host that signs its datagrams.
 class KeyHost {
  public:
   explicit KeyHost(TestBoard& to, const Key& its_key = key, Source place = {0, 7})
@@ -42,7 +41,6 @@ class KeyHost {
   std::string signed_fields(const std::string& text) {
     return test::with_signature(text, key_, nonce, ++counter, board.now_ms);
   }
-  // A signed heartbeat that echoes the board's time.
   std::string heartbeat() {
     listen();
     last = signed_fields(fields("H:ROS2-R4", echo));
@@ -113,8 +111,8 @@ TEST_F(ApplicationKey, IgnoresAHostThatDoesNotSign) {
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>());
 }
 
-// The board answers each of them: an attacker who sends many heartbeats cannot take the answer from
-// a host that still needs the nonce.
+// The board answers every such heartbeat. An attacker who sends many heartbeats cannot take the
+// answer from a host that needs the nonce.
 TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
   for (std::uint32_t peer = 90; peer < 99; ++peer) {
     board.take();
@@ -126,8 +124,8 @@ TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
   }
 }
 
-// docs/design/safety-argument.md: an attacker who forges an address can make the board send there
-// at most five times the bytes of the attack.
+// docs/design/safety-argument.md: with a forged address, an attacker can make the board send to
+// that address at most five times the bytes of the attack.
 TEST_F(ApplicationKey, AnswersWithAtMostFiveTimesTheBytes) {
   host.connect();
   std::size_t longest = 0;
@@ -155,7 +153,7 @@ TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuth) {
   }
 }
 
-// docs/reference/protocol.md 4.2: the T of a CONNECTING heartbeat is for the signature only; a host
+// docs/reference/protocol.md 4.2: the T of a CONNECTING heartbeat is only for the signature. A host
 // does not echo it.
 TEST_F(ApplicationKey, AnEchoOfAConnectingHeartbeatStartsNoSession) {
   for (int i = 0; i < 20; ++i) {
@@ -213,7 +211,6 @@ TEST_F(ApplicationKey, RejectsCommandsDelayedByMoreThan250Ms) {
   board.run(1);
   board.receive(late, host.at);
   EXPECT_TRUE(board.safe());
-  // A command with a higher counter is too old as well.
   const std::string later = host.signed_fields(host.fields("O:358,1,1", 1));
   board.run(251);
   board.receive(later, host.at);
@@ -243,12 +240,12 @@ TEST_F(ApplicationKey, AStopNeedsNoSignature) {
 TEST_F(ApplicationKey, AnUnsignedStopConfirmsNoCommand) {
   host.connect();
   const std::uint32_t executed = host.command("O:358,1,1");
-  // The stop has the number of a command that was kept from the board.
+  // The stop has the number of a command that the board has not received.
   const std::uint32_t held_back = host.pnum++;
   board.receive("E:STOP;" + test::stamp_of(our_session, held_back, 0), host.at);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_EQ(board.application->link().last_executed(), executed);
-  host.heartbeat();  // the board sends another nonce
+  host.heartbeat();
   const std::uint32_t stop = host.command("E:STOP");
   EXPECT_EQ(board.application->link().last_executed(), stop) << "a signed stop is a command";
 }
@@ -261,7 +258,7 @@ TEST_F(ApplicationKey, ASignedStopIsANewCauseAfterAForgedStop) {
   const std::string clear = "E:CLEAR," + std::to_string(board.newest_cause());
   ASSERT_EQ(host.pnum, next);
   host.command("E:STOP");
-  host.command(clear);  // the host asked for it before the stop
+  host.command(clear);  // made before the stop
   EXPECT_EQ(board.reason(), SafeReason::stop);
 }
 

@@ -97,7 +97,7 @@ TEST(ApplicationLink, TheTimeoutAppliesBeforeALateHeartbeat) {
   TestHost host(board, no_session);
   host.heartbeat(5);
   host.command("O:358,1,1");
-  board.now_ms += 999;  // the loop stood still: nothing was polled
+  board.now_ms += 999;  // the loop does not run
   board.application->poll(board.now_ms);
   board.now_ms += 1;
   board.application->drained(0);
@@ -107,9 +107,9 @@ TEST(ApplicationLink, TheTimeoutAppliesBeforeALateHeartbeat) {
   EXPECT_EQ(board.hal.made_safe, 2);
 }
 
-// --- a loop that stood still
+// --- a loop that did not run
 
-// A host as in the paper controls a board whose loop turns.
+// A paper host controls a board whose loop runs.
 struct ApplicationStandstill : testing::Test {
   ApplicationStandstill() {
     host.heartbeat(5);
@@ -117,7 +117,7 @@ struct ApplicationStandstill : testing::Test {
     board.run(500);
     board.take();
   }
-  // Milliseconds from now until the board becomes safe; 0 if it stays active for three seconds.
+  // Milliseconds from now until the board becomes safe. 0: it stays active for three seconds.
   std::uint32_t safe_after() {
     const std::uint32_t from_ms = board.now_ms;
     board.run(3000);
@@ -129,7 +129,7 @@ struct ApplicationStandstill : testing::Test {
 };
 
 TEST_F(ApplicationStandstill, AWaitingHeartbeatCountsFromTheStartOfTheStandstill) {
-  board.now_ms += 300;  // nothing was polled, and the heartbeat came at the beginning
+  board.now_ms += 300;  // the loop did not run, and the heartbeat came at the beginning
   host.heartbeat(6);
   EXPECT_FALSE(board.safe());
   EXPECT_EQ(safe_after(), 1000U - 300U);
@@ -137,7 +137,7 @@ TEST_F(ApplicationStandstill, AWaitingHeartbeatCountsFromTheStartOfTheStandstill
 
 TEST_F(ApplicationStandstill, AWaitingHeartbeatReadAfterAPollCountsFromTheStart) {
   board.now_ms += 300;
-  board.application->poll(board.now_ms);  // the timer came before the waiting datagrams were read
+  board.application->poll(board.now_ms);  // the timer fired before the waiting datagrams were read
   board.run(20);
   host.heartbeat(6);
   EXPECT_EQ(safe_after(), 1000U - 320U);
@@ -221,7 +221,7 @@ TEST_F(ApplicationStandstill, AStopActsAtOnceButAClearWithoutACauseMustWait) {
   board.run(500);
   host.heartbeat(7);
   board.run(300);
-  board.now_ms += 300;  // a second after the stop, but perhaps asked for sooner
+  board.now_ms += 300;  // the E:CLEAR may have been sent too soon after the stop
   host.heartbeat(8);
   host.command("E:CLEAR");
   EXPECT_EQ(board.log.states.back(), "SAFE stop");
@@ -241,7 +241,7 @@ TEST_F(ApplicationStandstill, ACommandOvertakenByAWaitingHeartbeatIsStale) {
   const std::uint32_t overtaken = host.pnum++;
   board.now_ms += 300;
   host.heartbeat(6);
-  host.resend("O:100,1,1", overtaken);  // perhaps 300 ms after it
+  host.resend("O:100,1,1", overtaken);  // perhaps sent 300 ms after the heartbeat
   EXPECT_EQ(board.log.refused, (Lines{std::to_string(overtaken) + " STALE"}));
 }
 
@@ -407,7 +407,6 @@ TEST(ApplicationLink, AnswersAHostThatHasNothingToEcho) {
 }
 
 TEST(ApplicationLink, AnswersAHostThatEchoesAnOldTime) {
-  // After a restart of the board.
   TestBoard board;
   TestHost host(board, our_session, Source{0, 3});
   board.take();
@@ -418,7 +417,6 @@ TEST(ApplicationLink, AnswersAHostThatEchoesAnOldTime) {
   EXPECT_EQ(heard[0].t_ms, board.now_ms);
   EXPECT_EQ(heard[0].peer, 3U);
 
-  // After an outage.
   board.run(20);
   host.connect();
   const std::uint32_t old_t = board.newest_t();
@@ -495,7 +493,7 @@ TEST(ApplicationLink, TheFirstNumberOfASessionIsOneOnEveryPort) {
   EXPECT_EQ(board.take(MessageKind::state, 1)[0].pnum, 1U);
 }
 
-// The paper's Python client: T comes before PNum, its clock counts in seconds, and it answers each
+// The paper's Python client puts T before PNum, counts its clock in seconds, and answers each
 // heartbeat.
 TEST(ApplicationLink, ServesThePapersPythonClient) {
   TestBoard board;
@@ -521,7 +519,7 @@ TEST(ApplicationLink, ServesThePapersPythonClient) {
 }
 
 TEST(ApplicationLink, ASessionContinuesWhenTheClockWraps) {
-  // Heartbeats are due on every half second, so one is due exactly when the clock wraps.
+  // Heartbeats are due every half second, so a heartbeat is due exactly when the clock wraps.
   TestBoard board({}, 1, 0U - 2000U);
   TestHost host{board, our_session, Source{0, 4}};
   host.connect();

@@ -32,7 +32,6 @@ struct ApplicationPaths : testing::Test {
     if (states.empty()) throw std::runtime_error("no state came");
     return state_of(states.back());
   }
-  // The codes of the answers on a port.
   Lines answers(int port) {
     Lines codes;
     for (const Heard& heard : board.take(MessageKind::nack, port)) {
@@ -211,8 +210,9 @@ TEST_F(ApplicationPaths, ADuplicateOfARefusedCommandGetsTheSameAnswer) {
   EXPECT_TRUE(board.safe());
 }
 
-// 400 commands a second: first over a slow path, then over the slow path and a fast one, then over
-// the fast one only. Heartbeats and commands share the numbers, so the fast path is far ahead.
+// 400 commands a second: first over a slow path, then over a slow and a fast path, then over the
+// fast path only. Heartbeats and commands share the numbers, so the numbers on the fast path are
+// far ahead.
 void expect_a_fast_path_takes_over(TestBoard& board, HostOnPaths& host, std::uint32_t lag_ms) {
   host.paths[0].cut = true;
   host.paths[1].lag_ms = lag_ms;
@@ -253,7 +253,6 @@ class ApplicationPathsWithAKey : public testing::Test {
     board.run(10);
     host.connect();
   }
-  // The nonce of the newest heartbeat.
   std::string nonce() { return test::str(board.application->authentication().nonce()); }
   const SessionPaths& paths() const { return board.application->paths(); }
 
@@ -269,7 +268,7 @@ TEST_F(ApplicationPathsWithAKey, ACommandSignedForEachPathIsExecutedOnce) {
   ASSERT_EQ(paths().size(), 2);
   board.log.rejected.clear();
   for (int i = 0; i < 200; ++i) {
-    host.paths[0].cut = i % 10 == 0;  // sometimes one path alone carries a command, later
+    host.paths[0].cut = i % 10 == 0;  // sometimes only the slower path carries a command
     host.command("Z:1");
     host.paths[0].cut = false;
     host.run(10);
@@ -348,7 +347,7 @@ TEST_F(ApplicationPaths, AFarewellOverAllPathsIsExecutedOnce) {
   const std::uint32_t leave = host.command("E:LEAVE");
   EXPECT_EQ(board.reason(), SafeReason::link);
   EXPECT_TRUE(board.safe());
-  // The host has ended; datagrams on their way still arrive.
+  // The host has ended, but datagrams on their way arrive.
   host.paths[0].cut = host.paths[1].cut = true;
   host.run(90);
   EXPECT_EQ(board.log.executed, Numbers{leave});
@@ -406,7 +405,7 @@ TEST_F(ApplicationPaths, TwoPathsOnOnePortGetTheSameDatagrams) {
   EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>());
 }
 
-// An answer carries the SID of its question, and only the host of that session may know it.
+// An answer carries the SID of its question, and only the host of the SID's session may receive it.
 TEST_F(ApplicationPaths, AnswersToAnotherHostGoOnlyToItsPath) {
   const Source other{0, 5};
   HostOnPaths host(board, {{path_a}, {other}});

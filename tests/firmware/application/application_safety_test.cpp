@@ -16,7 +16,6 @@ using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
 
-// A board whose host drives motor 1.
 struct ApplicationSafety : testing::Test {
   ApplicationSafety() {
     host.connect();
@@ -34,12 +33,12 @@ struct ApplicationSafety : testing::Test {
     board.hal.inputs.handle = held ? Handle::held : Handle::released;
     board.run(10);
   }
-  // E:CLEAR by the controlling host, which has heard the cause to clear.
+  // Sends E:CLEAR as the controlling host, which has received the newest cause.
   std::uint32_t clear() {
     board.run(0);
     return host.clear();
   }
-  // Only a command brings outputs back, whatever else the host does.
+  // Only a command restores outputs, whatever else the host sends.
   void expect_nothing_restored() {
     host.stay(200);
     EXPECT_EQ(board.state(), BoardState::active);
@@ -94,7 +93,7 @@ TEST_F(ApplicationSafety, AnOldStopIsObeyed) {
   EXPECT_TRUE(board.safe());
   clear();
   host.command("O:1,1,1");
-  host.resend("E:STOP", old);  // also if it comes again
+  host.resend("E:STOP", old);
   EXPECT_TRUE(board.safe());
 }
 
@@ -115,7 +114,7 @@ TEST_F(ApplicationSafety, AStopWithoutASessionUsesUpNoCommandNumber) {
   board.log.refused.clear();
   host.resend("O:1,1,1", executed);
   EXPECT_EQ(board.log.refused, Lines{std::to_string(executed) + " DUPLICATE"});
-  // A command that was long on its way arrives after the E:CLEAR. It stays without effect.
+  // A command that was delayed arrives after the E:CLEAR, and has no effect.
   const std::uint32_t under_way = host.pnum++;
   const std::uint32_t cleared = clear();
   EXPECT_EQ(board.state(), BoardState::active);
@@ -144,7 +143,7 @@ TEST_F(ApplicationSafety, AStopIsAnsweredOnEveryPortAndToItsSender) {
     EXPECT_EQ(heard.kind, MessageKind::board_heartbeat);
     EXPECT_NE(heard.bytes.find(";SAFE:2;"), std::string::npos);
   }
-  // Each repetition is answered to its sender, so a sender on a bad line learns that it was obeyed.
+  // Each repetition is answered to its sender, so on a bad link the sender receives a confirmation.
   two.receive("E:STOP;PNum:1;T:1;", Source{1, 99});
   two.receive("E:STOP;PNum:1;T:1;", Source{0, 4});
   first = two.take(0);
@@ -209,12 +208,12 @@ TEST_F(ApplicationSafety, ARepeatedClearDoesNotClearALaterStop) {
 TEST_F(ApplicationSafety, ADelayedClearDoesNotClearANewerStop) {
   host.command("E:STOP");
   const std::string asked = host.clear_field();
-  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});  // pressed again, by another person
+  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});  // a second stop, from another peer
   board.log.refused.clear();
   std::uint32_t number = host.command(asked);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_EQ(board.log.refused, Lines{std::to_string(number) + " STALE"});
-  host.echo();  // also if the host has heard the second cause and asks for the first
+  host.echo();  // also if the host has the second cause and clears the first cause
   board.run(2000);
   host.connect();
   number = host.command(asked);
@@ -233,7 +232,7 @@ TEST_F(ApplicationSafety, ADelayedClearDoesNotClearANewerFault) {
     clear();
     EXPECT_EQ(board.reason(), cause);
     const std::string again = host.clear_field();
-    board.application->fail(cause, board.now_ms);  // the same fault again
+    board.application->fail(cause, board.now_ms);
     host.command(again);
     EXPECT_EQ(board.reason(), cause);
     clear();
@@ -308,7 +307,7 @@ TEST_F(ApplicationSafety, HeartbeatsNameTheNewestStop) {
   EXPECT_EQ(newest().stop, 78U);
   board.receive("E:STOP;PNum:77;T:1;", Source{0, 99});  // a late duplicate
   EXPECT_EQ(newest().stop, 77U);
-  // The stop as a frame on a CAN bus reports it.
+  // A frame on a CAN bus reports a stop in this form.
   board.receive("E:STOP;STOP:200000;", Source{0, 99});
   EXPECT_EQ(newest().stop, 200000U);
   board.receive("E:STOP;", Source{0, 99});
@@ -373,7 +372,7 @@ TEST_F(ApplicationSafety, StateKeepsComingWhileStopped) {
   EXPECT_EQ(heard.size(), 10U);
   const State state = state_of(heard.back());
   EXPECT_EQ(state.safe, SafeReason::stop);
-  EXPECT_EQ(state.raw.osmc[0].pwm, 0);  // the real state of the output, not the commanded one
+  EXPECT_EQ(state.raw.osmc[0].pwm, 0);  // the real state of the output, not the commanded state
 }
 
 // --- fault and watchdog
@@ -400,7 +399,7 @@ TEST_F(ApplicationSafety, TheBoardIsSafeUntilTheHandleIsHeldAgain) {
   EXPECT_EQ(board.log.states, Lines{"SAFE handle"});
   host.command("O:1,1,1");
   EXPECT_TRUE(board.safe());
-  clear();  // does not clear a released handle
+  clear();  // E:CLEAR does not clear a released handle
   EXPECT_EQ(board.reason(), SafeReason::handle);
   handle(true);
   EXPECT_EQ(board.log.states, (Lines{"SAFE handle", "ACTIVE none"}));
@@ -448,7 +447,7 @@ TEST_F(ApplicationSafety, AHandleReleasedAtRecoveryRestoresNoOutputs) {
   const int changes = board.log.outputs;
   host.echo();
   EXPECT_TRUE(board.safe());
-  EXPECT_EQ(board.log.outputs, changes);  // not for an instant
+  EXPECT_EQ(board.log.outputs, changes);  // the outputs do not change even briefly
   handle(true);
   expect_nothing_restored();
 }
@@ -472,7 +471,7 @@ TEST_F(ApplicationSafety, AnObstacleKeepsTheBoardSafeUntil5CmBeyondTheThreshold)
   host.stay(20);
   EXPECT_EQ(board.reason(), SafeReason::none);
   distance(34);
-  EXPECT_EQ(board.reason(), SafeReason::none);  // the threshold of 30 cm counts again
+  EXPECT_EQ(board.reason(), SafeReason::none);  // the threshold of 30 cm applies again
   expect_nothing_restored();
 }
 
@@ -551,7 +550,7 @@ TEST_F(ApplicationSafety, AChipFaultIsReportedWithChipAndTrouble) {
   EXPECT_EQ(state.safe, SafeReason::fault);
   EXPECT_EQ(state.fault, (ChipFault{64, ChipTrouble::no_acknowledge}));
 
-  clear();  // executed; but the fault is still there
+  clear();  // executed, but the fault persists
   host.stay(100);
   EXPECT_EQ(board.reason(), SafeReason::fault);
   host.command("O:1,1,1");

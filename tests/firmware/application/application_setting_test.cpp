@@ -28,7 +28,7 @@ TEST_F(ApplicationSetting, SettingsTakeEffectAtOnce) {
   EXPECT_EQ(board.take(MessageKind::state).size(), 100U);
 
   host.command("C:timeout,200");
-  EXPECT_EQ(answers(), Lines{"RANGE"});  // it must be longer than the interval of heartbeats
+  EXPECT_EQ(answers(), Lines{"RANGE"});  // the timeout must exceed the heartbeat interval
   host.command("C:heartbeat,50");
   host.command("C:timeout,200");
   host.echo();
@@ -100,7 +100,7 @@ TEST_F(ApplicationSetting, TheSettingPackTurnsThePackedFormOnAndOff) {
   EXPECT_TRUE(board.ports[0].packed);
 }
 
-// Another host, which knows the text only, may come next.
+// The next host may not support the packed form.
 TEST_F(ApplicationSetting, ABoardWithoutAHostSendsPlainText) {
   board.run(1000);
   ASSERT_EQ(board.reason(), SafeReason::link);

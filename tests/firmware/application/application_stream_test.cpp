@@ -72,7 +72,7 @@ TEST(ApplicationStream, SendsTheNewestInputs) {
   EXPECT_EQ(state.raw.stepper_steps[1], 2'000'000'000);
 }
 
-// Makes every field as long as it can get.
+// Makes every field as long as possible.
 void fill(TestBoard& board, TestHost& host) {
   for (auto& cv : board.hal.inputs.analog_cv) cv = -327'680;
   for (auto& steps : board.hal.inputs.stepper_steps) steps = -2'000'000'000;

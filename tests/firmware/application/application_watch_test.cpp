@@ -18,9 +18,8 @@ using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
 
-// A watcher at its own address.
 struct TestWatcher {
-  // The datagrams that came to the watcher since the last call.
+  // The datagrams that the watcher received since the last call.
   std::vector<Heard> take() {
     std::vector<Heard> mine;
     for (const Heard& heard : board.take(at.port)) {
@@ -40,7 +39,7 @@ struct TestWatcher {
     board.receive(
         "W:" + lease + ";PNum:" + std::to_string(pnum++) + ";T:" + std::to_string(echo) + ";", at);
   }
-  // Asks for a lease, takes the answer and echoes it.
+  // Requests a lease, takes the answer and echoes it.
   void watch(const std::string& lease) {
     take();
     ask(lease, 0);
@@ -85,7 +84,6 @@ TEST(ApplicationWatch, ABoardWithoutAHostStreamsToAWatcherAndStaysSafe) {
   EXPECT_TRUE(watcher.take(MessageKind::state).empty()) << "its lease has ended";
 }
 
-// On a bus, a host also hears the datagrams for watchers.
 TEST(ApplicationWatch, AHostCanEchoAHeartbeatSentToAWatcher) {
   TestBoard board;
   TestWatcher watcher{board, Source{0, 9}};
@@ -100,7 +98,7 @@ TEST(ApplicationWatch, AHostCanEchoAHeartbeatSentToAWatcher) {
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-// On a bus, W shows only that there is a watcher (docs/reference/can.md).
+// On a bus, W shows only that a watcher exists (docs/reference/can.md).
 TEST(ApplicationWatch, OnABusTheBoardStreamsToWatchersUntilAHostConnects) {
   TestBoard board({}, 2);
   board.ports[1].bus = true;
@@ -169,7 +167,7 @@ TEST_F(ApplicationWatched, AWatcherCanCommandOnlyStops) {
   board.take();
   board.receive("O:5,1,2;PNum:70;T:1;", watcher.at);
   board.receive("H:ROS2-R4;PNum:71;T:1;", watcher.at);
-  // A farewell with the same echo as a farewell of the host.
+  // A farewell of the watcher, with the same echo as a farewell of the host.
   const std::string t = std::to_string(board.newest_t());
   board.receive("E:LEAVE;PNum:72;T:" + t + ";", watcher.at);
   EXPECT_EQ(board.outputs().osmc[1].pwm, 0);
@@ -215,7 +213,7 @@ TEST_F(ApplicationWatched, IgnoresAWatcherWithoutAPacketNumber) {
   EXPECT_TRUE(watcher.take().empty());
 }
 
-// As on a bus: host and watcher share one address.
+// On a bus, host and watcher share one address.
 TEST_F(ApplicationWatched, AWatcherAtTheHostsAddressDoesNotAffectTheCounters) {
   TestWatcher beside{board, host.at, 1'000'000};
   for (int i = 0; i < 10; ++i) {
@@ -230,7 +228,7 @@ TEST_F(ApplicationWatched, AWatcherAtTheHostsAddressDoesNotAffectTheCounters) {
   EXPECT_EQ(state.rx_duplicate, 0U);
 }
 
-// On a serial line every datagram for everyone arrives anyway, with the numbers of the line.
+// On a serial line every datagram reaches everyone, with the numbers of the line.
 TEST(ApplicationWatch, AllDatagramsOnASerialLineShareItsNumbers) {
   TestBoard board({}, 2);
   TestWatcher watcher{board, Source{1, everyone}};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus: the driver on the model of the bus, in virtual time, with one turn of the
-// loop each millisecond.
+// The driver of the user's I2C bus on the model of the bus, in virtual time. The loop turns once a
+// millisecond.
 #include "firmware/devices/user_i2c.hpp"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,6 @@ namespace {
 using sim::UserBusModel;
 using sim::UserDevice;
 
-// Records the driver's accesses to the lines.
 struct LineLog final : UserI2cPort {
   Progress progress() override { return Progress::lost; }
   void begin(const UserTransfer&) override {}
@@ -32,7 +31,7 @@ struct LineLog final : UserI2cPort {
   void resume() override { resumed = true; }
   bool scl = true, sda = true, stop_seen = false, resumed = false;
   int clocks = 0;
-  int held_clocks = 0;  // clocks for which a device still holds SDA
+  int held_clocks = 0;  // remaining clocks for which a device holds SDA
 };
 
 class UserBus : public testing::Test {
@@ -144,7 +143,7 @@ TEST_F(UserBus, SkipsReadingsMissedDuringAStandstill) {
   pass(5);
   const std::uint32_t before = devices.bus.transfers();
   devices.bus.advance(200'000);
-  now_ms += 200;  // the loop stood still
+  now_ms += 200;  // the loop did not run
   bus.poll(now_ms);
   pass(9);
   EXPECT_LE(devices.bus.transfers() - before, 2U);
@@ -182,7 +181,7 @@ TEST_F(UserBus, ClocksUntilSdaIsReleasedAndEndsWithAStopCondition) {
     driver.ask(1, Command::i2c_read(0x68, "x75", 1));
     for (std::uint32_t ms = 1; ms < 50 && !lines.resumed; ++ms) {
       driver.poll(ms);
-      driver.poll(ms);  // a loop that turns faster does not clock faster
+      driver.poll(ms);  // a faster loop does not clock faster
     }
     EXPECT_EQ(lines.clocks, held + 1) << "the last clock is that of STOP";
     EXPECT_TRUE(lines.stop_seen);
@@ -190,7 +189,7 @@ TEST_F(UserBus, ClocksUntilSdaIsReleasedAndEndsWithAStopCondition) {
   }
 }
 
-// Two programs, or two threads of a program, may ask.
+// Two programs, or two threads of a program, may request transfers.
 TEST_F(UserBus, AnAnswerStaysUntilTheNextAnswerIsReady) {
   EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1)), "done 104");
   ASSERT_TRUE(bus.ask(9, Command::i2c_scan()));

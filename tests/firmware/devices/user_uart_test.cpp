@@ -14,7 +14,7 @@ namespace {
 
 using sim::UartPeer;
 
-// The test decides when bytes come in.
+// The test decides when bytes arrive.
 struct Line final : UserUartPort {
   void set_up(const UartMode& wanted) override {
     mode = wanted;
@@ -101,7 +101,7 @@ TEST_F(UserUartTest, CountsDroppedAndDamagedBytes) {
       << "the position is that of the bytes that were kept";
 }
 
-// As at 115200 baud, 8N1: 11.52 bytes a millisecond, and a state every 10 ms.
+// 115200 baud, 8N1: 11.52 bytes a millisecond, and a state every 10 ms.
 TEST_F(UserUartTest, ReportsABurstOf530BytesWithoutLoss) {
   std::string sent;
   for (int i = 0; i < 530; ++i) sent += static_cast<char>('a' + i % 26);
@@ -232,7 +232,7 @@ TEST_F(UserUartOnTheModel, ReceivesALidarAt100HzWithoutLoss) {
 TEST_F(UserUartOnTheModel, CountsBytesThatDoNotFit) {
   listen(uart_max_baud, UartPeer::noise, 1000);
   EXPECT_EQ(heard.size(), 6400U) << "64 in each state";
-  // Each byte that the peer sent is in a state, counted as lost, or still waiting.
+  // Each byte that the peer sent is in a state, counted as lost, or waiting.
   EXPECT_NEAR(static_cast<double>(heard.size() + lost), model.said(), 256 + UserUart::backlog);
   EXPECT_GE(heard.size() + lost + 256 + UserUart::backlog, model.said());
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transfers on a simulated bus, as text: "40 <- 00 31 04" is a write, "40 <- 00 -> 21 04" a
-// read of a register. " NACK" marks a refused transfer, " TIMEOUT" a transfer on a held bus or one
-// that was cut short, and "recover" stands for nine clocks.
+// The transfers on a simulated bus, as text. "40 <- 00 31 04" is a write. "40 <- 00 -> 21 04" reads
+// a register. " NACK" marks a refused transfer. " TIMEOUT" marks a transfer on a held bus or a
+// transfer that was cut short. "recover" means nine clocks.
 #pragma once
 
 #include <cstdint>
@@ -40,7 +40,6 @@ class BusLog final : public sim::I2cObserver {
 
 std::string to_text(const BusLog::Transfer& transfer);
 std::vector<std::string> lines(const BusLog& log);
-// Only the writes to a chip, not the reads.
 std::vector<std::string> writes(const BusLog& log);
 
 struct BusCost {

@@ -18,7 +18,6 @@ using sim::I2cBusModel;
 using sim::Pca9685Model;
 using Lines = std::vector<std::string>;
 
-// A chip, its driver and the bus between them.
 struct Pca9685Bench {
   explicit Pca9685Bench(std::uint32_t hz = 1000) : pwm(bus, 0x40, hz) { bus.attach(chip); }
   void set_up() {

@@ -37,7 +37,7 @@ struct AnalogOutputPinModel final : firmware::AnalogOutputPin {
   std::uint16_t millivolts = 0;
 };
 
-// The board's chips and pins. A provisioned EEPROM keeps the set-up short.
+// A provisioned EEPROM keeps the set-up short.
 struct BoardParts : sim::BoardChips {
   BoardParts() {
     for (int i = 0; i < sim::Mcp4728Model::channels; ++i) dac.set_eeprom(i, {});
@@ -65,10 +65,10 @@ struct BoardParts : sim::BoardChips {
   std::array<InputPinModel, gpio_channels> gpio;
 };
 
-// The outputs as the chips' pins show them, without the steppers.
+// The outputs that the chips' pins show, without the steppers.
 firmware::Outputs outputs_of(const BoardParts& board);
-// `outputs` as the pins can show them: without steppers, and servo pulses rounded to the nearest
-// count.
+// `outputs` as the pins can show them: without steppers, and with servo pulses rounded to the
+// nearest count.
 firmware::Outputs as_pins(firmware::Outputs outputs);
 
 }  // namespace r4::test

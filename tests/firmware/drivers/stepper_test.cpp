@@ -25,7 +25,7 @@ TEST(Stepper, GoesToItsPositionAndStays) {
   StepperBench bench;
   bench.stepper.go(100, 1000);
   EXPECT_TRUE(bench.stepper.moving());
-  bench.tick(tick_hz / 10 + 1);  // one tick for the direction
+  bench.tick(tick_hz / 10 + 1);  // one tick is for the direction
   EXPECT_EQ(bench.stepper.position(), 100);
   EXPECT_TRUE(bench.direction.high);
   bench.tick(tick_hz);
@@ -41,7 +41,7 @@ TEST(Stepper, GoesToItsPositionAndStays) {
 }
 
 TEST(Stepper, SpeedIsExactOverDays) {
-  // The speed does not divide the rate of ticks, and after three days no step may be missing.
+  // The speed does not divide the rate of ticks. After three days no step may be missing.
   test::OutputPinModel step;
   test::OutputPinModel direction;
   Stepper stepper(step, direction, 200, 20000);

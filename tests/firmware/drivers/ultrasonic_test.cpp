@@ -66,7 +66,7 @@ TEST(UltrasonicSensors, TakesTurnsSixtyMillisecondsApart) {
   }
 }
 
-// docs/reference/safety.md, "How long it takes", without the turn of the application.
+// The limit of docs/reference/safety.md, "How long it takes", without the turn of the application.
 TEST(UltrasonicSensors, SeesAnObstacleOrASilentSensorWithinFourTurnsAndItsEcho) {
   struct Case {
     std::uint32_t echo_us;

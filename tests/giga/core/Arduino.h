@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The parts of ArduinoCore-mbed 4.6.0 and ArduinoCore-API 1.5.2 that the firmware uses: our own
-// declarations, and the macros of the original, which can break any header that is included after
-// them.
+// declarations, and the macros of the original. The macros can break any header that is included
+// after them.
 #pragma once
 
 #include <cstddef>

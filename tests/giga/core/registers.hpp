@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The STM32H747's registers that the firmware uses, by their CMSIS names. The compiler check sees
-// plain words; the tests run on objects with behaviour.
+// The STM32H747's registers that the firmware uses, by their CMSIS names. In the compiler check
+// they are plain words. In the tests they are objects with behaviour.
 #pragma once
 
 #include <cstdint>
@@ -133,7 +133,7 @@ void __enable_irq();
 std::uint32_t __get_IPSR();
 std::uintptr_t __get_MSP();  // on the chip an address is 32 bits
 void __DSB();
-void NVIC_SetVector(IRQn_Type line, std::uintptr_t vector);  // likewise
+void NVIC_SetVector(IRQn_Type line, std::uintptr_t vector);  // the vector is an address
 void NVIC_EnableIRQ(IRQn_Type line);
 void NVIC_SetPriority(IRQn_Type line, std::uint32_t priority);
 void NVIC_SetPendingIRQ(IRQn_Type line);

@@ -57,5 +57,5 @@ int main() {
   expect(giga.chips.pins().is_safe(), "silence makes it safe");
   std::puts("the sketch runs");
   std::fflush(stdout);
-  std::_Exit(0);  // its threads never end
+  std::_Exit(0);  // the firmware's threads never end
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The datagrams that pass a bridge to a board with a key, or to a board that obeys its cable
-// without a key.
+// The datagrams that pass a bridge to a board with a key, or to a board that accepts commands from
+// its cable without a key.
 #include "host/bridge/bridge_guard.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hosts that a bridge serves, and the effects that strangers can have on them.
+// The hosts that a bridge serves, and how strangers can affect them.
 #include "host/bridge/bridge_hosts.hpp"
 
 #include <gtest/gtest.h>

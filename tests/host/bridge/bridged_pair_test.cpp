@@ -26,7 +26,7 @@ constexpr Peer first = 1, second = 2, third = 3;
 class BridgedPairTest : public testing::Test, protected ScriptedBridge {
  protected:
   void SetUp() override { pair->open(); }
-  // Begins with the first host served and a board that streams states.
+  // Begins with a board that streams states and with the first host.
   void begin() {
     board->say(board_state);
     hosts->say(heartbeat, first);
@@ -403,7 +403,7 @@ TEST_F(BridgedPairTest, ServesAtMostFourWatchers) {
   EXPECT_EQ(hosts->take().size(), 5U) << "a stranger must not take the place of a watcher";
 }
 
-// --- for weeks
+// --- over weeks
 
 TEST_F(BridgedPairTest, AllocatesNothingPerDatagramWithManyHosts) {
   begin();

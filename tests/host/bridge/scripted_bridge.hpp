@@ -57,8 +57,8 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
   void report(CarrierEvent::Kind kind) {
     handler_->on_carrier_event({kind, Problem{ErrorKind::open, name_, "gone", ""}});
   }
-  // The datagrams sent since the last call, without checksums. "@peer" is added if sent to one
-  // peer.
+  // The datagrams sent since the last call, without checksums. "@peer" follows a datagram that was
+  // sent to one peer.
   std::vector<std::string> take() {
     std::vector<std::string> texts;
     for (const Sent& each : std::exchange(sent, {})) {
@@ -68,7 +68,7 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
     return texts;
   }
 
-  std::optional<Problem> absence;  // the reason if it cannot be opened
+  std::optional<Problem> absence;  // the reason if the transport cannot be opened
   SendResult result = SendResult::sent;
   CarrierCounters counted;
   bool shared = false;
@@ -86,7 +86,7 @@ class ScriptedBridge {
  public:
   using Texts = std::vector<std::string>;
 
-  // `trusted`: as BridgeGuard takes it.
+  // `trusted`: passed to BridgeGuard.
   explicit ScriptedBridge(std::vector<Key> keys = {}, bool trusted = false) {
     BridgedPair::Setup setup;
     setup.keys = std::move(keys);
@@ -105,14 +105,14 @@ class ScriptedBridge {
     pair = std::make_unique<BridgedPair>(std::move(setup));
   }
 
-  // Time passes while the loop runs.
+  // Advances the time while the loop runs.
   void pass(std::chrono::milliseconds time) {
     for (const auto end = now + time; now < end;) {
       now += std::min<std::chrono::steady_clock::duration>(WaitingTime::tick_interval, end - now);
       pair->tick();
     }
   }
-  // Time passes while the process is stopped.
+  // Advances the time while the process is stopped.
   void sleep(std::chrono::milliseconds time) { now += time; }
   // The datagrams that have passed to the board since the last call, without the bridge's own W.
   Texts passed() {

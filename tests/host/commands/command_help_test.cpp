@@ -58,7 +58,7 @@ TEST(CommandHelp, ShowsTheValidValuesOfASetting) {
 }
 
 // Section 3 of docs/reference/protocol.md has a row for each kind of command, with the form and the
-// ranges of the tables.
+// ranges of the command tables.
 TEST(CommandHelp, HasTheFormsAndRangesOfTheDocumentedProtocol) {
   std::ifstream file(R4_TEST_DATA "/../../docs/reference/protocol.md");
   std::map<std::string, std::string> documented;
@@ -76,7 +76,7 @@ TEST(CommandHelp, HasTheFormsAndRangesOfTheDocumentedProtocol) {
   EXPECT_EQ(documented.size(), all_command_help().size()) << "a documented row has no command";
 }
 
-// The tables of settings on that page have the range and the default of each setting.
+// The tables of settings on the same page have the range and the default of each setting.
 TEST(CommandHelp, TakesTheDocumentedSettings) {
   std::ifstream file(R4_TEST_DATA "/../../docs/reference/protocol.md");
   std::map<std::string, std::string> documented;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Options and times without a valid meaning are refused before anything is sent.
 #include "host/commands/limits.hpp"
 
 #include <gtest/gtest.h>
@@ -77,7 +76,7 @@ TEST(Limits, CoverEveryTimeout) {
     });
   }
   expect_usage("wait_active()", [&] { board.wait_active(-1ms); });
-  board.wait_active(0ms);  // does not wait
+  board.wait_active(0ms);
   EXPECT_EQ(board.next_state().osmc(1).pwm, 0);
 }
 

@@ -62,7 +62,7 @@ TEST(LoopGuard, EndsForGoodWhenACompleteStateIsLate) {
   EXPECT_TRUE(contains(guard.why(), "more than 50 ms ago with all of ENC1")) << guard.why();
   EXPECT_FALSE(guard.on_state(part(1061, {StateField::enc1}), DisarmCause::none, at(1061)));
 
-  // Arrives, but was under way for too long.
+  // A state that arrives, but too late.
   LoopGuard delayed = begun({.late = 50ms});
   EXPECT_FALSE(delayed.on_state(part(1010, {}), DisarmCause::none, at(1070)));
   EXPECT_EQ(delayed.ended(), LoopEnd::late);
@@ -184,7 +184,7 @@ TEST_F(RunLoop, StopsTheHeartbeatsWhenAStepHangs) {
   bool safe = false;
   const LoopReport report = run_loop(board, loop, [&](const LoopStep& step) {
     if (step.state.encoder(1) > 5 && !safe) {
-      // Waits until the board is safe. Only the watchdog can cause that.
+      // Waits until the board is safe. Only the watchdog can make it safe.
       for (int ms = 0; ms < 10'000 && !safe; ++ms) {
         std::this_thread::sleep_for(1ms);
         safe = robot.look().pins.is_safe();
@@ -207,7 +207,7 @@ TEST_F(RunLoopWithoutArming, DrivesAndStopsTheMotors) {
   const auto drive_four_times = [&](const LoopStep& step) {
     return ++steps < 5 ? drive(step) : std::nullopt;
   };
-  // The loop's options require an armed board: the loop does not run, and leaves no output driven.
+  // The loop requires an armed board: it does not run, and leaves no output driven.
   const LoopReport untold = run_loop(board, loop, drive_four_times);
   EXPECT_EQ(untold.end, LoopEnd::disarmed);
   EXPECT_TRUE(contains(untold.why, "not yet; call arm() first")) << untold.why;

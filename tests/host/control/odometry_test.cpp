@@ -37,7 +37,7 @@ TEST(Odometry, GoesBackwardsAndStartsAtAGivenPose) {
   EXPECT_NEAR(odometry.pose().yaw_rad, std::numbers::pi / 2, 1e-12);
 }
 
-// Many robots whose wheels err as the noise model says. The spread of their poses must match the
+// Many robots with the wheel errors of the noise model. The spread of their poses must match the
 // covariance.
 TEST(Odometry, CovarianceMatchesTheSpreadOfPoses) {
   constexpr OdometryNoise noise{

@@ -21,7 +21,7 @@ TEST(Pid, AddsItsTermsUp) {
 TEST(Pid, DoesNotWindUpWhileTheOutputIsAtItsLimit) {
   Pid pid({.kp = 1, .ki = 10});
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(pid.step(5, 0, 0.01), 1);
-  // The output must leave the limit at once: the integral must not grow at the limit.
+  // The output must leave the limit at once, so the integral must not grow at the limit.
   EXPECT_LT(pid.step(5, 5.5, 0.01), 0);
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(pid.step(-5, 0, 0.01), -1);
   EXPECT_GT(pid.step(-5, -5.5, 0.01), 0);

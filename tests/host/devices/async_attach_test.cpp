@@ -25,7 +25,6 @@ Device slow() {
                        "write x6b00 wait 5000\npoll all x3b 2 10\nvalue a all 0 i16be\n");
 }
 
-// A board with an MPU-6050 at 0x68 and an INA219 at 0x40.
 class AsyncAttach : public testing::Test, protected OnALoop {
  protected:
   explicit AsyncAttach(const BoardOptions& options = at_will()) : board_(io, "sim:", options) {
@@ -120,7 +119,7 @@ TEST_F(AsyncAttach, RefusesADeviceThatDoesNotAnswer) {
 
 TEST_F(AsyncAttach, CanBeCancelledWhileItWaitsForTheDevice) {
   asio::cancellation_signal signal;
-  std::optional<std::uint32_t> first;  // of the check
+  std::optional<std::uint32_t> first;  // packet number of the device check
   const ScopedSubscription states =
       board_.on_state([&](const ReceivedState& state, const Datagram&) {
         const std::uint32_t answered = state.i2c_answer.pnum;

@@ -18,7 +18,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// This script connects all devices to the bus.
 constexpr const char* all_connected =
     "0 device icm20948 on\n0 device bno055 on\n0 device vl53l0x on\n0 device as5600 on\n";
 
@@ -26,7 +25,7 @@ class DescribedDevice : public testing::Test {
  protected:
   DescribedDevice() { board_.wait_active(); }
 
-  // Waits for a value. The test fails if the value does not come.
+  // Waits for a value. The test fails if the value does not arrive.
   double wait_for(const Device& device, std::string_view value) {
     for (int i = 0; i < 300; ++i) {
       const auto reading = device.reading(board_.next_state(), value);

@@ -65,7 +65,7 @@ TEST(Discovery, TheErrorForNoBoardNamesTheSearchedTransports) {
 TEST(Discovery, TheErrorForSeveralBoardsNamesTheirUrls) {
   for (const Discovery& all :
        {discovery_of({found_board("udp:?id=b-1", "b-1"), found_board("udp:?id=b-2", "b-2")}),
-        // The same id twice on one transport, or no id, may mean two boards.
+        // The same id twice on one transport, or a missing id, may mean two boards.
         discovery_of({found_board("udp:?id=b-1", "b-1"), found_board("udp:?id=b-2", "b-1")}),
         discovery_of({found_board("udp:?id=b-1", ""), found_board("udp:?id=b-2", "")})}) {
     const Problem problem = problem_of([&] { all.only(); });

@@ -24,7 +24,6 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 using Boards = Fleet::Boards;
 
-// A fleet whose boards are active.
 struct ActiveFleet : Fleet {
   explicit ActiveFleet(const std::vector<std::string>& urls, const BoardOptions& options = {})
       : Fleet(urls, options) {
@@ -102,7 +101,7 @@ TEST(Fleet, SendsSetpointsOfSeveralBoards) {
   ActiveFleet fleet({"sim:?node=0-7"}, at_will());
   std::vector<BoardSetpoints> setpoints;
   for (std::size_t i = 0; i < 8; ++i) setpoints.push_back({i, motor(100 + static_cast<int>(i))});
-  // A group is sent after the board has reported that it executes groups.
+  // A group is sent only after the board has reported that it executes groups.
   ASSERT_TRUE(comes([&] {
     for (const PostResult each : fleet.post(setpoints)) {
       if (!each) return false;

@@ -15,12 +15,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A board, a link with a random delay in each direction, and a host that asks; in virtual time.
+// A board, a link with a random delay in each direction, and a host that sends questions, in
+// virtual time.
 struct ClockBench {
   struct Options {
-    double drift_ppm = 0;  // the board's clock is slower by this
+    double drift_ppm = 0;  // how much slower the board's clock is
     double least_us = 100, most_us = 300;
-    double least_back_us = -1, most_back_us = -1;  // of the board's datagrams, if it differs
+    double least_back_us = -1, most_back_us = -1;  // from the board to the host; -1: the same delay
     unsigned seed = 1;
   };
 
@@ -45,7 +46,7 @@ struct ClockBench {
   }
   static Time time(double us) { return Time{static_cast<std::int64_t>(us)}; }
 
-  // A state arrives that was sampled at this time of the board. Returns its error in us.
+  // Delivers a state that was sampled at this time of the board. Returns its error in us.
   double state(int board_ms) {
     const double sent = host_us(board_ms * 1000.0);
     clock.heard(first_t + static_cast<std::uint32_t>(board_ms), time(sent + delay(true)));
@@ -64,7 +65,7 @@ struct ClockBench {
     clock.heard(t_ms, time(came + delay(true)));
     clock.answered(t_ms, time(sent));
   }
-  // States at 100 Hz, and questions as a session asks them. Returns the greatest error after
+  // States at 100 Hz, and questions as a session sends them. Returns the greatest error after
   // `settled_ms`.
   double run(int from_ms, int to_ms, int settled_ms) {
     double worst = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The datagrams that one path of a session admits, and which of them are new; without a session.
-// tests/host/session/session_paths_test.cpp tests two and more paths.
+// The datagrams that one path of a session admits, and which of them are new, without a session.
+// tests/host/session/session_paths_test.cpp tests several paths.
 #include "host/paths/paths.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ struct OnePath : testing::Test {
     if (admission != Admission::no) paths.is_newest(0, board_t(), now);
     return admission;
   }
-  // Handled as by a session. Returns true if the heartbeat is new.
+  // Handles a heartbeat as a session does. Returns true if the heartbeat is new.
   bool heartbeat(std::uint32_t t_ms, std::uint32_t pnum) {
     const Admission admission = paths.admit(0, pnum, t_ms, now);
     if (admission == Admission::restarted) link.on_restart();
@@ -33,7 +33,6 @@ struct OnePath : testing::Test {
   bool heartbeat() { return heartbeat(board_t(), board_pnum++); }
   bool booting() { return paths.admit_connecting(0, now); }
   void pass(int ms) { now += std::chrono::milliseconds{ms}; }
-  // Sends a question.
   void ask() { paths.asked(0, ++question, true, now); }
   Admission answer() {
     Identity identity{Text("0.1.0"), Text("board"), Text("udp")};
@@ -210,7 +209,7 @@ TEST_F(OnePath, QuestionsDuringAnOutageDoNotProveARestart) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
-  for (int i = 0; i < 20; ++i) {  // of the board's clock, in an outage
+  for (int i = 0; i < 20; ++i) {  // time of the board's clock during an outage
     pass(100);
     ask();
   }

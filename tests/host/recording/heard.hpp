@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shared by the tests of recordings: the records that a reader has read, and a full disk.
+// For the tests of recordings: the records that a reader has read, and a full disk.
 #pragma once
 
 #include <sys/resource.h>
@@ -53,7 +53,7 @@ inline Heard heard_in(std::string_view bytes, std::size_t piece = 1000) {
   return heard;
 }
 
-// While this object lives, the process can write at most this number of bytes into a file.
+// While this object exists, the process can write at most this number of bytes into a file.
 struct FileLimit {
   explicit FileLimit(rlim_t bytes) {
     ::getrlimit(RLIMIT_FSIZE, &before);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// read_recording(): a recording read by a C++ program.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -44,7 +43,7 @@ struct VisitorOfAll final : RecordingVisitor {
 
 TEST(ReadRecording, VisitsEveryRecord) {
   const std::string path = testing::TempDir() + "r4-read-" + std::to_string(::getpid());
-  std::uint64_t received = 0;  // after record()
+  std::uint64_t received = 0;  // datagrams received after record()
   {
     Board board("sim:", at_will());
     board.record(path);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lines of a recording.
 #include "r4link/recordings/record_line.hpp"
 
 #include <gtest/gtest.h>
@@ -50,7 +49,7 @@ TEST(RecordLine, RejectsATextThatIsNotATime) {
 }
 
 TEST(RecordLine, ForAStateHasAtMostTwoHundredBytes) {
-  // With the fields that a host in control adds to those of the paper, after a day.
+  // A state after a day, with the paper's fields and the fields for a host in control.
   const std::string state =
       "AIN24:24.56;AIN12:12.15;AIN5:5.11;AINDMH:12.16;DMHSTA:1;AINSTEER:0.95;DHB1A:4095,1;"
       "OSMC1:358,1;STEP1POS:-100;SERVO1POS:2000;CMD:2541659426;PNum:8640000;T:86400000;^"
@@ -175,7 +174,6 @@ TEST(RecordLine, ForADeviceHasItsAddressSlotAndDescription) {
   EXPECT_EQ(read.device.path, 3);
   EXPECT_EQ(read.device.place, "my one@0x28:1");
   EXPECT_EQ(read.device.description, "device mine\naddress 0x40\n# \\\xff\n");
-  // The longest line must be readable.
   text.clear();
   write_device(text, {65535, "mine@0x28:1", std::string(5000, '\n')});
   EXPECT_LE(text.size(), max_record_line);

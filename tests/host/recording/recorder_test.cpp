@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board's link is recorded while it runs. No fault of the recording may disturb the link.
+// A board's link is recorded while it runs. A fault of the recording must not disturb the link.
 #include "host/recording/recorder.hpp"
 
 #include <gtest/gtest.h>

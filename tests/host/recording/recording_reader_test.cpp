@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads recordings in every state: damage is reported with its place, and the rest is read.
+// Reads recordings in every state: damage is reported with its place, and the undamaged records are
+// read.
 #include "r4link/recordings/recording_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +30,6 @@ std::string head(const std::string& url = "udp://robot") {
 const std::string other_head = head("udp://another-robot");
 const std::string end_of_it = "1795468299.000000 0! end\n";
 
-// Different records, one line each.
 std::string lines(int from, int count) {
   std::string text;
   for (int i = from; i < from + count; ++i) {

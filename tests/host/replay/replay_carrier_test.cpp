@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Recordings used as a transport.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -30,7 +29,6 @@ struct Replay : testing::Test {
            std::uint16_t path = 1) {
     write_record(text, {Time{1795468293s} + at, path, kind, bytes});
   }
-  // Plays the whole recording.
   void play(const std::string& options) {
     std::ofstream(file) << text;
     const auto carrier = standard_registry().make(io, "replay:" + file + options, Role::host);

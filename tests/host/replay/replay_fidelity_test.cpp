@@ -41,7 +41,7 @@ struct ToldOfABoard {
                         std::to_string(result.position) + ": " + std::string(bytes));
     });
     board.on_event([this](const CarrierEvent& event) {
-      if (event.kind == CarrierEvent::Kind::warning) return;  // of this program, not of the board
+      if (event.kind == CarrierEvent::Kind::warning) return;  // about this program
       events.push_back(to_text(event.kind) + (" " + event.problem.reason));
     });
     board.on_link([this](const LinkStatus& link) {
@@ -51,7 +51,7 @@ struct ToldOfABoard {
     board.on_restart([this] { ++restarts; });
   }
 
-  // After 50 ms a board takes what waits for a backlog.
+  // After a standstill of 50 ms, a board treats waiting datagrams as a backlog.
   void look() {
     const auto now = std::chrono::steady_clock::now();
     stood_still = stood_still || now - looked > 30ms;
@@ -85,7 +85,7 @@ struct ToldOfABoard {
   int restarts = 0;
   asio::steady_timer timer;
   std::chrono::steady_clock::time_point looked = std::chrono::steady_clock::now();
-  bool stood_still = false;  // this program
+  bool stood_still = false;  // this program did not run for 30 ms
 };
 
 TEST(ReplayFidelity, HasTheSameStatesEventsAndStatisticsAsLive) {
@@ -125,7 +125,7 @@ TEST(ReplayFidelity, HasTheSameStatesEventsAndStatisticsAsLive) {
   std::filesystem::remove(path);
 
   EXPECT_GT(live.states.size(), 80U);
-  // After a standstill of this program, live or in the replay, the newest state alone is reported.
+  // After a standstill of this program, live or in the replay, only the newest state is reported.
   std::size_t in_both = 0;
   for (const auto& [number, state] : played.states) {
     const auto same = live.states.find(number);

@@ -23,7 +23,7 @@ struct RobotOnPaths::Board final : firmware::Hal, firmware::Observer {
     std::uint8_t number = 0;
   };
 
-  // A cable may be plugged into another board: each board has a port for each cable.
+  // A cable may be plugged into another board, so each board has a port for each cable.
   Board(RobotOnPaths& r, std::size_t i) : robot(r), name("board-" + std::to_string(i)) {
     for (std::size_t path = 0; path < robot.cables.size(); ++path) {
       ends.push_back(std::make_unique<End>(robot, i, path));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host session over several paths to real boards in virtual time, in steps of a millisecond. Each
-// path has its own delay. The test can cut it in one direction or both, with or without notice.
+// A host session over several paths to real boards, in virtual time with steps of a millisecond.
+// Each path has its own delay. The test can cut a path in one or both directions, with or without
+// notice.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -28,7 +29,7 @@ class RobotOnPaths final : private DrivenSession::Handler {
     std::size_t board;
     bool listens = false;  // a bus, on which a watcher must not send questions
     bool cut_to_board = false, cut_to_host = false;
-    std::vector<std::string> sent;                    // by the host
+    std::vector<std::string> sent;                    // datagrams sent by the host
     std::vector<std::string> all(char letter) const;  // the datagrams that begin with this letter
   };
 
@@ -39,23 +40,22 @@ class RobotOnPaths final : private DrivenSession::Handler {
   ~RobotOnPaths();
   static SessionOptions at_will();
 
-  // Brings the transports of all paths up, and lets half a second pass.
+  // Brings the transports of all paths up, and advances the time by half a second.
   void connect();
   void run(std::uint32_t ms);
-  // The host's computer sleeps: its clock stands still, and datagrams that arrive meanwhile are
-  // lost. After waking, its boot clock shows the sleep.
+  // The host sleeps: its clock stops, and datagrams that arrive meanwhile are lost. After waking,
+  // its boot clock includes the sleep.
   void sleep(std::uint32_t ms);
-  // The same for a paused virtual machine: no clock shows the pause.
+  // Like sleep(), but as in a paused virtual machine: no clock includes the pause.
   void pause(std::uint32_t ms);
   // Without notice, like a cable that is cut somewhere in a network.
   void cut(std::size_t path, bool is_cut = true);
-  // With notice of the transport.
+  // With notice by the transport.
   void plug(std::size_t path, bool in);
   // The board restarts, and its clock begins at `t_ms`.
   void reboot(std::size_t board, std::uint32_t t_ms = 50);
   // Delivers a datagram to the host as if it came over that path.
   void bring(std::size_t path, std::string_view bytes);
-  // Waits for the end of a command.
   CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);
   CommandResult drive(int pwm) {
     return finish(session->send(Command::osmc(1, Pwm(pwm), Direction::forward), timeout, now()));
@@ -76,7 +76,7 @@ class RobotOnPaths final : private DrivenSession::Handler {
   std::uint32_t oldest_age_ms = 0;  // the greatest age of a state when it was reported
   std::int64_t longest_gap_ms = 0;  // between two states
   std::uint64_t told_states = 0;
-  bool went_back = false;  // a state was reported that is older than an earlier reported state
+  bool went_back = false;  // a reported state was older than an earlier reported state
   std::vector<LinkStatus> links;
   std::vector<Nack> nacks;
   std::map<Ticket, CommandResult> results;
@@ -114,7 +114,6 @@ class RobotOnPaths final : private DrivenSession::Handler {
   std::deque<Packet> packets_;
 };
 
-// Two equal paths to one board, connected.
 struct TwoPaths : testing::Test {
   TwoPaths() { robot.connect(); }
   RobotOnPaths robot{RobotOnPaths::Cables{{1}, {1}}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host session in virtual time with a board whose every datagram the test writes.
+// A host session in virtual time, with a board whose every datagram the test writes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,12 +14,11 @@
 
 namespace r4::test {
 
-// A command for tests that need any command.
+// For tests that need any command.
 inline const Command turn_motor = Command::osmc(1, Pwm(358), Direction::forward);
 
 class ScriptedLink : private DrivenSession::Handler {
  public:
-  // A datagram of the host.
   struct Sent {
     std::string command;  // "O:358,1,1"
     std::uint32_t pnum = 0;
@@ -31,10 +30,10 @@ class ScriptedLink : private DrivenSession::Handler {
 
   explicit ScriptedLink(SessionOptions options = without_questions(),
                         BoardRole role = BoardRole::control);
-  // Options with which the session by itself sends only heartbeats and its choice of fields, and
+  // With these options the session by itself sends only heartbeats and its choice of fields, and it
   // sends commands without being armed.
   static SessionOptions without_questions();
-  // The same, but the session must be armed.
+  // Like without_questions(), but the session must be armed.
   static SessionOptions must_arm();
 
   DrivenSession session;
@@ -52,36 +51,37 @@ class ScriptedLink : private DrivenSession::Handler {
   std::vector<Nack> nacks;
   std::string board_id;
 
-  // True if another host sends from the same place, so that the carrier takes only stops.
+  // True if another host sends as the same peer, so that the carrier accepts only stops.
   bool place_taken = false;
   TransportTrouble frames = TransportTrouble::none;  // the trouble with frames on the bus
 
-  // Lets time pass. poll() is called exactly when the session asked for it.
+  // Advances the time, and calls poll() exactly when it is due.
   void pass(Time duration);
 
-  // The board sends. Its clock runs with the host's clock; its packet numbers count by themselves.
+  // Sends a datagram of the board. Its clock runs with the host's clock, and its packet numbers
+  // count up.
   void boot_heartbeat();  // H:R4-ROS2;PNum:0;T:0;
   void heartbeat(SafeReason reason = SafeReason::none);
   void stopped(std::uint32_t stop, int cause = 1);  // SAFE:2 after the E:STOP with this number
-  // Fields such as "AIN24:24.28;CMD:7;". The safe reason is a field like any other.
+  // Fields such as "AIN24:24.28;CMD:7;". The safe reason is a field of `fields`.
   void state(std::string_view fields);
   void executed(std::uint32_t pnum);  // a state with SAFE 0 and this CMD
-  // Addressed to the host of the session that began with heartbeat session_pnum; 0: to another
-  // host.
+  // Addresses the host of the session that began with heartbeat session_pnum. 0: another host.
   void nack(std::uint32_t pnum, std::string_view code);
   std::uint32_t session_pnum = 0;       // set by connect()
-  SessionId host_session = no_session;  // of the host's newest datagram; answers name it
+  SessionId host_session = no_session;  // SID of the host's newest datagram, which answers name
   // The answer to the host's newest question. Older boards do not name the question.
   void identity(std::string_view capabilities = "udp", bool names_question = true);
   void answer(std::uint32_t question, std::string_view capabilities = "udp");
   std::string asker() const;  // "SID:…;"
   void raw(std::string_view bytes);
-  // The board restarts, with another clock and new packet numbers; nothing is sent.
+  // The board restarts, with another clock and new packet numbers, and sends nothing.
   void reboot();
   std::uint32_t board_ms() const { return board_clock(); }
   std::uint32_t board_pnum = 5000;
 
-  // Heartbeat, echo, and a confirmed F: commands can be sent after this. Clears the sent datagrams.
+  // Exchanges heartbeat and echo, and confirms F, so that commands can be sent. Clears the sent
+  // datagrams.
   void connect();
 
   // The host's datagrams with commands of this letter, and the newest of them.
@@ -113,7 +113,6 @@ class ScriptedLink : private DrivenSession::Handler {
   std::uint32_t clock_offset_ = 77'000;
 };
 
-// A link whose session is in control of its board.
 struct ConnectedLink : ScriptedLink {
   explicit ConnectedLink(SessionOptions options = without_questions())
       : ScriptedLink(std::move(options)) {
@@ -121,7 +120,6 @@ struct ConnectedLink : ScriptedLink {
   }
 };
 
-// A session whose board has not been heard yet.
 struct NewSession : testing::Test {
   explicit NewSession(SessionOptions options = ScriptedLink::without_questions(),
                       BoardRole role = BoardRole::control)
@@ -136,7 +134,6 @@ struct NewSession : testing::Test {
   ScriptedLink link;
 };
 
-// A session that is in control of its board.
 struct ConnectedSession : NewSession {
   explicit ConnectedSession(SessionOptions options = ScriptedLink::without_questions())
       : NewSession(std::move(options)) {

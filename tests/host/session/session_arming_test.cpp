@@ -38,8 +38,8 @@ struct SessionArming : ConnectedSession {
     link.sent.clear();
   }
   PostResult post() { return link.session.post(turn_motor, link.now); }
-  // The link is lost, and the board is heard again. Relay 1 shows whether the board has restored
-  // its outputs.
+  // The link is lost, and then heartbeats arrive again. Relay 1 shows whether the board has
+  // restored its outputs.
   void outage(bool relay) {
     link.pass(1500ms);
     EXPECT_EQ(post(), PostResult::no_link);
@@ -225,9 +225,9 @@ TEST_F(SessionArming, AnOvertakenStateDoesNotProveThatRelay1IsOpen) {
 
 struct EarlierCause : NewSession {
   EarlierCause() : NewSession(ScriptedLink::must_arm()) {}
-  // A program starts. Its board obeys it and is safe for this reason.
+  // A program starts while its board is safe for this reason. The board obeys the program.
   void begin(SafeReason reason) {
-    link.heartbeat();  // delayed by the network since before the cause: it proves nothing
+    link.heartbeat();  // sent before the cause and delayed by the network, so it proves nothing
     link.heartbeat(reason);
     link.pass(10ms);
     says(reason);
@@ -311,7 +311,7 @@ TEST_F(EarlierCause, StaysEarlierIfTheStopIsPressedAgain) {
 
 TEST_F(EarlierCause, MayBeHiddenByALaterStop) {
   begin(SafeReason::fault);
-  says(SafeReason::stop);  // pressed meanwhile
+  says(SafeReason::stop);  // a stop that came after the start
   const Ticket ticket = link.session.arm(1s, link.now);
   link.pass(1ms);
   ASSERT_EQ(link.count('E'), 1U) << "the stop came while the program was running";

@@ -127,7 +127,7 @@ TEST_F(SessionCommand, WaitsForTheStateAfterADuplicateAnswer) {
 TEST_F(NewSession, ConfirmsACommandByItsValueIfTheBoardHasNoCmd) {
   link.heartbeat();
   const Ticket ticket = link.session.send(turn_motor, 20s, link.now);
-  for (int i = 0; i < 300; ++i) {  // the paper's board knows neither F nor CMD
+  for (int i = 0; i < 300; ++i) {  // the paper's board has neither F nor CMD
     link.pass(10ms);
     link.state("AIN24:24.28;OSMC1:0,0;");
   }
@@ -342,7 +342,7 @@ TEST_F(SessionClear, IsCancelledWhenTheBoardReportsANewerCause) {
   const Ticket sent = link.session.send(Command::clear(), 1s, link.now);
   link.stopped(1, 7);
   EXPECT_TRUE(under_way(sent));
-  link.stopped(2, 8);  // pressed again
+  link.stopped(2, 8);  // a second stop
   EXPECT_EQ(outcome(sent), Outcome::cancelled);
   const std::size_t clears = link.count('E');
   link.pass(500ms);
@@ -362,7 +362,7 @@ TEST_F(SessionClear, IsCancelledIfItWasCalledBeforeAnOwnStopIsConfirmed) {
   const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
   const std::uint32_t number = link.last('E').pnum;
   const Ticket clear = link.session.send(Command::clear(), 1s, link.now);
-  link.stopped(number, 7);  // the program did not know this cause
+  link.stopped(number, 7);  // the program had not received this cause
   EXPECT_EQ(outcome(stop), Outcome::confirmed);
   EXPECT_EQ(outcome(clear), Outcome::cancelled);
 }
@@ -373,7 +373,7 @@ TEST_F(SessionRefusal, OfALaterSessionDoesNotEndTheCommand) {
   const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.pass(100ms);
-  link.session_pnum = 0;  // the board takes the host for a stranger: its address has changed
+  link.session_pnum = 0;  // the host's address has changed, so the board treats it as a stranger
   link.nack(pnum, "SAFE");
   EXPECT_TRUE(under_way(ticket));
   link.session_pnum = pnum + 1;  // the host's first heartbeat after an outage
@@ -459,7 +459,7 @@ TEST_F(SessionBusy, ARefusalAfterAnOutageCountsOnlyInTheSameSession) {
   link.session_pnum = link.last('H').pnum;
   link.nack(pnum, "STALE");
   EXPECT_TRUE(under_way(ticket)) << "the board may have executed it before the outage";
-  // only the direction to the host was cut: the board remembers the session
+  // Only the direction to the host was cut, so the board continues the session.
   link.session_pnum = before;
   link.nack(pnum, "STALE");
   EXPECT_EQ(outcome(ticket), Outcome::refused);

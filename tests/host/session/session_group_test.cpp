@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Groups of commands: one datagram if the board executes groups, otherwise one command after the
-// other.
+// Groups of commands: one datagram if the board executes groups, otherwise one command after
+// another.
 #include <gtest/gtest.h>
 
 #include "r4link/commands/command_text.hpp"
@@ -26,7 +26,6 @@ struct SessionGroup : NewSession {
   }
   Ticket send(Time timeout = 1s) { return link.session.send(two_motors, timeout, link.now); }
   PostResult post() { return link.session.post(two_motors, link.now); }
-  // The command fields of a datagram.
   static std::string fields(const ScriptedLink::Sent& sent) {
     return sent.bytes.substr(0, sent.bytes.find("SID:"));
   }
@@ -157,7 +156,7 @@ TEST_F(SessionGroup, IsNotSplitWhileAnswersAreLost) {
 TEST_F(SessionGroup, IsSentOneByOneToABoardThatAnswersNothing) {
   link.heartbeat();
   send(20s);
-  for (int i = 0; i < 300; ++i) {  // the paper's board knows neither F nor Q
+  for (int i = 0; i < 300; ++i) {  // the paper's board has neither F nor Q
     link.pass(10ms);
     link.state("AIN24:24.28;OSMC1:0,0;");
   }

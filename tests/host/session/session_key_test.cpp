@@ -25,7 +25,6 @@ SessionOptions keyed() {
   return options;
 }
 
-// A heartbeat of the board with a nonce.
 void keyed_heartbeat(ScriptedLink& link, const std::string& its_nonce = nonce,
                      const std::string& reason = "") {
   link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(link.board_pnum++) +
@@ -42,7 +41,7 @@ void connect_keyed(ScriptedLink& link) {
   link.sent.clear();
 }
 
-// The board reports with its nonce for two seconds that it is booting.
+// For two seconds, the board sends its nonce and reports that it is booting.
 void boot_with_a_key(ScriptedLink& link) {
   for (int i = 0; i < 4; ++i) {
     link.raw(
@@ -59,7 +58,7 @@ struct SessionWithKey : SessionKey {
   SessionWithKey() { connect_keyed(link); }
 };
 
-// The field A of a datagram; empty if there is none.
+// The field A of a datagram; empty if there is no A.
 std::string signature_of(const ScriptedLink::Sent& sent) {
   Datagram datagram;
   EXPECT_TRUE(read_datagram(sent.bytes, datagram));
@@ -204,7 +203,7 @@ TEST_F(SessionKey, ReportsThatTheBoardDoesNotAcceptItsKey) {
   EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
-// The earlier host ended with a stop, so the board's cause hides whether it has a host.
+// The previous host ended with a stop, so the board's cause hides whether it has a host.
 TEST_F(SessionKey, ReportsThatAStoppedBoardDoesNotAcceptItsKey) {
   for (int i = 0; i < 12; ++i) {
     keyed_heartbeat(link, nonce, ";SAFE:2");
@@ -230,8 +229,8 @@ TEST_F(SessionKey, AStoppedBoardThatAnswersBusyHasAnotherHost) {
   EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
 }
 
-// At the lowest rate the host sends several heartbeats between two states. None of them may be in
-// vain.
+// At the lowest rate the host sends several heartbeats between two states. None of these heartbeats
+// may count as refused.
 TEST_F(SessionWithKey, AStateASecondShowsThatAStoppedBoardAcceptsTheKey) {
   for (int i = 0; i < 10; ++i) {
     link.state("SAFE:2;CMD:0;");

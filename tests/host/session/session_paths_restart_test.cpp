@@ -67,7 +67,6 @@ TEST(SessionPaths, SurviveALateHeartbeatOfABootingBoard) {
   EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
 }
 
-// With and without the other path.
 TEST(SessionPaths, ALateBootHeartbeatDoesNotEndTheSession) {
   for (const bool alone : {false, true}) {
     RobotOnPaths robot(Cables{{1}, {1}});
@@ -101,8 +100,8 @@ TEST_F(TwoPaths, RestartTheSessionWhenAnAnswerConfirmsABootHeartbeat) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-// No answer shows another clock: there is no answer, or the board restarted with nearly the same
-// clock.
+// No answer shows another clock: there is no answer, or the board has restarted with nearly the
+// same clock.
 TEST(SessionPaths, RepeatedBootHeartbeatsRestartTheSession) {
   for (const bool answers : {false, true}) {
     RobotOnPaths robot(Cables{{1}, {1}});

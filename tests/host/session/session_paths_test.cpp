@@ -78,7 +78,7 @@ TEST(SessionPaths, DropAnOldStateFromASlowPath) {
   EXPECT_NEAR(static_cast<double>(robot.told_states), 200, 2);
   EXPECT_LE(robot.oldest_age_ms, 3U);
   EXPECT_EQ(robot.restarts, 0);
-  robot.cut(0);  // only the slow path is left
+  robot.cut(0);  // only the slow path remains
   robot.run(3000);
   EXPECT_EQ(robot.trips, 0);
   EXPECT_FALSE(robot.went_back);
@@ -173,7 +173,7 @@ TEST_F(TwoPaths, ReportARefusalOnce) {
   EXPECT_TRUE(robot.nacks.empty()) << "the answer to a duplicate must not be reported";
   const Ticket ticket =
       robot.session->send(Command::setting("timeout", "100"), RobotOnPaths::timeout, robot.now());
-  // out of range: the timeout must exceed the heartbeat interval
+  // Out of range: the timeout must exceed the heartbeat interval.
   const CommandResult result = robot.finish(ticket);
   EXPECT_EQ(result.outcome, Outcome::refused);
   EXPECT_EQ(result.code, Refusal::range);
@@ -181,8 +181,8 @@ TEST_F(TwoPaths, ReportARefusalOnce) {
   EXPECT_EQ(robot.nacks.size(), 1U);
 }
 
-// AUTH refuses one duplicate of a command. While another path is heard, the duplicate there may be
-// executed.
+// AUTH refuses one duplicate of a command. While another path works, the duplicate on that path may
+// be executed.
 TEST_F(TwoPaths, AuthEndsACommandOnlyWithoutAnotherPath) {
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const Ticket ticket =
@@ -360,7 +360,7 @@ TEST_F(TwoPaths, AHeartbeatFromBeforeTheFarewellDoesNotConfirmIt) {
   const auto safe = [](std::uint32_t t_ms) {
     return with_crc("H:R4-ROS2;PNum:9;T:" + std::to_string(t_ms) + ";SAFE:1;");
   };
-  robot.bring(0, safe(newest_ms));  // of the millisecond of a state: the order is not known
+  robot.bring(0, safe(newest_ms));  // in the same millisecond as a state, so the order is unknown
   EXPECT_EQ(robot.results.count(ticket), 0U);
   robot.bring(0, safe(robot.board_ms(0) + 2));
   ASSERT_EQ(robot.results.count(ticket), 1U);

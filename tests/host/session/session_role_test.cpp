@@ -18,7 +18,6 @@ struct SessionRole : NewSession {
     link.session.on_transport(0, true, link.now);
     link.pass(1ms);
   }
-  // A host that is in control.
   void take() {
     change(BoardRole::control);
     link.connect();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host whose computer slept, with the real board. The host's clock stood still during the sleep,
-// and the host begins another session.
+// A host that slept, with the real board. The host's clock stops during the sleep, and the host
+// begins another session.
 #include <gtest/gtest.h>
 
 #include "robot_on_paths.hpp"
@@ -18,14 +18,14 @@ class SleepingHost : public ::testing::TestWithParam<Cables> {
   void cut_all(RobotOnPaths& of, bool is_cut = true) {
     for (std::size_t path = 0; path < of.cables.size(); ++path) of.cut(path, is_cut);
   }
-  // All longer than the board waits for its host; shorter or longer than the tolerance of the
-  // board's clock.
+  // All are longer than the board waits for its host. Some are shorter and some longer than the
+  // tolerance of the board's clock.
   static constexpr std::uint32_t naps_ms[] = {1500, 9000, 60'000};
 
   RobotOnPaths robot{GetParam()};
 };
 
-// The board's setting `recovery` is `last`: it restores its outputs if a session continues.
+// With the setting recovery=last, the board restores its outputs if a session continues.
 TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
   for (const std::uint32_t nap_ms : naps_ms) {
     RobotOnPaths sleeper(GetParam());
@@ -56,8 +56,8 @@ TEST_P(SleepingHost, FindsTheMotorsOffAfterAPauseOfItsVirtualMachine) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-// These commands were not sent before the sleep: the board was not heard yet, the link was lost, or
-// the board had restarted.
+// These commands were not sent before the sleep: the board was not connected yet, the link was
+// lost, or the board had restarted.
 TEST_P(SleepingHost, CancelsEarlierCommandsAndArms) {
   enum class Link { never_heard, lost, restarted };
   for (const Link link : {Link::never_heard, Link::lost, Link::restarted}) {
@@ -100,7 +100,7 @@ TEST_P(SleepingHost, SwitchesTheMotorsOffBeforeALongBoardTimeout) {
   EXPECT_TRUE(patient.session->in_control(patient.now()));
 }
 
-// The command was under way when the computer went to sleep. It may arrive late or never.
+// The command was being sent when the host went to sleep. It may arrive late or never.
 TEST_P(SleepingHost, RepeatsNoEarlierCommand) {
   for (const std::uint32_t later_ms : {0U, 10U, 60U}) {
     RobotOnPaths sender(GetParam());

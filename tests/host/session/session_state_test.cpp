@@ -13,7 +13,6 @@ using namespace std::chrono_literals;
 using Clock = ReceivedState::Clock;
 using SessionState = ConnectedSession;
 
-// The present age of the session's state.
 Clock::duration age(const ScriptedLink& link) {
   return link.session.state().age(Clock::time_point(link.now));
 }
@@ -117,7 +116,6 @@ TEST_F(SessionState, KeepsTheSafeReasonOfAHeartbeatThatOvertookIt) {
   for (const std::uint32_t earlier_ms : {0U, 5U}) {
     ConnectedLink each;
     each.pass(20ms);
-    // number of the state, which was sent before the heartbeat
     const std::uint32_t number = each.board_pnum++;
     each.heartbeat(SafeReason::stop);
     each.raw(with_crc("AIN24:24.28;SAFE:0;PNum:" + std::to_string(number) +

@@ -93,7 +93,8 @@ TEST_F(SessionFarewell, IsConfirmedByTheAnswerToARepetitionToo) {
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-// T has a resolution of one millisecond, and a farewell may be sent at any time within it.
+// T has a resolution of one millisecond, and a farewell may be sent at any time within the
+// millisecond.
 TEST_F(SessionFarewell, IsConfirmedByAHeartbeatOfTheSameMillisecond) {
   for (const int us : {0, 200, 400, 600, 800, 999}) {
     ConnectedLink each;
@@ -105,7 +106,7 @@ TEST_F(SessionFarewell, IsConfirmedByAHeartbeatOfTheSameMillisecond) {
   }
 }
 
-// The heartbeat is of a board that had lost its host for a while.
+// The board had lost its host before it sent the heartbeat.
 TEST_F(SessionFarewell, IsNotConfirmedByAnEarlierHeartbeat) {
   RobotOnPaths robot(RobotOnPaths::Cables{{40}});
   robot.connect();
@@ -206,7 +207,7 @@ TEST_F(SessionLink, IsLostWhenTheBoardIsSilentAndRecoversByItself) {
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
 }
 
-// T wraps after 49 days. After half of that, two values cannot be compared.
+// T wraps after 49 days. Two values cannot be compared after half of that time.
 TEST_F(SessionLink, HearsABoardAgainAfterAMonthOfSilence) {
   for (int day = 0; day < 30; ++day) {
     link.now += 24h;
@@ -249,7 +250,7 @@ TEST_F(SessionLink, AddsItsOwnFieldsToTheFieldsOfTheUser) {
   link.session.send(Command::fields("CMD,ENC1,SAFE"), 1s, link.now);
   EXPECT_EQ(link.last('F').command, "F:CMD,ENC1,SAFE") << "the user's fields already contain all";
   link.executed(link.last('F').pnum);
-  link.pass(2s);  // the link is lost, and the board has forgotten the fields
+  link.pass(2s);  // the link is lost, and the board has reset its fields
   link.boot_heartbeat();
   link.heartbeat();
   link.pass(10ms);

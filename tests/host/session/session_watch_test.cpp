@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that only watches: it keeps its lease, hears the board, and sends no command.
+// A session that only watches: it renews its lease, receives states, and sends no command.
 #include <gtest/gtest.h>
 
 #include "host/session/session.hpp"
@@ -47,7 +47,7 @@ TEST_F(SessionWatch, EchoesALeaseAtOnce) {
   EXPECT_EQ(link.last('W').t, 7U);
 }
 
-// So the watcher hears the board again after the program whose path it shared has ended.
+// A watcher gets states again after the program whose path it shared has ended.
 TEST_F(SessionWatch, AsksAtOnceWhenATransportComesUp) {
   link.place_taken = true;
   link.pass(600ms);

@@ -19,7 +19,7 @@ TEST_F(SessionWatchdog, HoldsCommandsOfAProgramThatDoesNotFeed) {
   link.session.watchdog(300ms, link.now);
   const Time begin = link.now;
   const Ticket lost =
-      // a call that waits for a board that does not answer
+      // A call that waits for a board that does not answer.
       link.session.send(turn_motor, 1s, link.now);
   link.pass(400ms);
   const std::size_t sent = link.count('O');
@@ -94,8 +94,8 @@ TEST_F(SessionHold, HeartbeatsResumeAfterBothHoldAndWatchdogEnd) {
 
 TEST_F(SessionLink, SendsNoCommandAfterItsDeadline) {
   link.place_taken = true;
-  link.session.post(Command::servo(1, Microseconds(1500)), link.now);  // the place is taken
-  link.session.send(turn_motor, 100ms, link.now);                      // waits for the place
+  link.session.post(Command::servo(1, Microseconds(1500)), link.now);
+  link.session.send(turn_motor, 100ms, link.now);  // waits until the place is free
   link.place_taken = false;
   link.now += 750ms;                     // the loop was delayed
   link.executed(link.session_pnum + 1);  // confirms the choice of fields

@@ -24,7 +24,7 @@ std::string edited(const std::string& from, const std::string& to) {
   return text.replace(at, from.size(), to);
 }
 
-// Expects that reading `text` fails, with these words.
+// Expects that reading `text` fails with these words.
 void expect_error(const std::string& text, const std::string& where, const std::string& words) {
   try {
     read_wiring(text, "robot.wiring");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Properties of every datagram. A failure prints RC_PARAMS with its seed. To run it again, set the
-// same RC_PARAMS in the environment.
+// Properties of every datagram. A failure prints RC_PARAMS with its seed. To repeat the failure,
+// set the same RC_PARAMS in the environment.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
@@ -21,7 +21,6 @@ using test::paper_capture;
 using test::str;
 using test::with_crc;
 
-// The content of a datagram.
 struct Content {
   std::vector<std::pair<std::string, std::string>> fields;
   std::optional<std::uint32_t> pnum;
@@ -45,7 +44,6 @@ std::optional<Content> read_content(const std::string& bytes) {
   return content_of(datagram);
 }
 
-// All bytes from `first` to `last` except those in `except`.
 std::string bytes_but(char first, char last, const std::string& except) {
   std::string bytes;
   for (char c = first; c <= last; ++c) {
@@ -72,7 +70,7 @@ rc::Gen<std::string> any_values() {
   return text_of(alphabet, 0, 30);
 }
 
-// Any content; PNum and T are at any place or missing.
+// Any content. PNum and T are at any place or missing.
 rc::Gen<Content> any_content() {
   return rc::gen::exec([] {
     Content content;
@@ -110,7 +108,6 @@ std::string write(const Content& content) {
   return str(writer.finish());
 }
 
-// A datagram of at most max_datagram bytes.
 rc::Gen<std::string> any_datagram() {
   return rc::gen::map(any_content(), [](Content content) {
     while (with_crc(text_of(content)).size() > max_datagram) content.fields.pop_back();
@@ -173,7 +170,7 @@ RC_GTEST_PROP(DatagramProperty, AcceptedIsWhatTheGrammarSays, ()) {
   RC_ASSERT(read_content(bytes).has_value() == is_datagram(bytes));
 }
 
-// The same with fields of all lengths, and with any byte at any place.
+// Long datagrams: fields of all lengths, and any byte at any place.
 RC_GTEST_PROP(DatagramProperty, AcceptedIsWhatTheGrammarSaysOfLongDatagramsToo, ()) {
   static const std::string alphabet = ":;, ^xT\n\x7F\x80";
   const std::string good = *any_datagram();
@@ -211,7 +208,7 @@ RC_GTEST_PROP(DatagramProperty, AnySingleByteOfDamageIsRefusedOrChangesNothing, 
   }
 }
 
-// The same for the capture, with every byte at every place instead of random ones.
+// Damages the capture: every byte at every place.
 TEST(DatagramProperty, ADamagedByteIsRefusedOrChangesNothing) {
   std::size_t same = 0;
   for (const std::size_t line : {0U, 6U, 12U, 15U, 19U}) {  // state, commands, heartbeats

@@ -117,7 +117,7 @@ TEST_F(TestAuthentication, RejectsCounterValuesBelowAForgottenOne) {
 }
 
 // Each key has separate counters. If one key is used much, the board forgets the counter values of
-// another key and then refuses them.
+// another key and then refuses that key's counter values.
 TEST_F(TestAuthentication, ForgetsTheOldestCounterValueOfAllKeys) {
   const auto sign_other = [this](std::uint64_t counter) {
     return sign(counter, now, key_of(5, 100));

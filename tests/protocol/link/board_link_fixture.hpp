@@ -80,8 +80,8 @@ struct BoardLinkTest : testing::Test {
     return std::string(name_of(code).data(), name_of(code).size());
   }
 
-  // Connects a host with a SID. It sends heartbeat first_number without an echo, then first_number
-  // + 1.
+  // Connects a host with a SID. Its first heartbeat has no echo and the number first_number. Its
+  // second heartbeat has the next number.
   void connect() {
     send_due();
     ASSERT_EQ(heartbeat(first_number, 0), HeartbeatEffect::unheard);

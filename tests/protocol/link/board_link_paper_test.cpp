@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of the link with hosts as in the paper's release, without a SID.
+// The board's end of the link with paper hosts, which have no SID.
 #include "board_link_fixture.hpp"
 
 namespace r4 {
@@ -11,7 +11,7 @@ TEST_F(BoardLinkTest, APaperHostWithItsOwnClockKeepsTheLinkAlive) {
   for (std::uint32_t i = 1; i < 5; ++i) {
     run(900);
     EXPECT_EQ(heartbeat(8 * i, 1699276044383, paper),
-              HeartbeatEffect::fed);  // a clock may stand still
+              HeartbeatEffect::fed);  // a clock may stop
   }
   run(1000);
   EXPECT_EQ(heartbeat(100, 1699276044390, paper), HeartbeatEffect::new_session);
@@ -53,7 +53,7 @@ TEST_F(BoardLinkTest, AnEchoingPaperHostReconnectsOnlyWithANewEcho) {
 }
 
 TEST_F(BoardLinkTest, AHostWithAnotherClockIsAnotherHost) {
-  // The same peer without packet numbers, as on a serial line.
+  // A host without packet numbers at the same peer, as on a serial line.
   send_due();
   numberless(0);
   numberless(sent.back());

@@ -328,8 +328,8 @@ TEST_F(BoardLinkTest, LatenessCountsFromTheFirstOvertakingHeartbeat) {
     heartbeat(first_number + 10 + 2 * i, sent.back());
     run(50);
   }
-  EXPECT_EQ(command(first_number + 17), "STALE");    // heartbeat 18 came 300 ms ago
-  EXPECT_EQ(command(first_number + 19), "execute");  // heartbeat 20 came 250 ms ago
+  EXPECT_EQ(command(first_number + 17), "STALE");    // heartbeat 18 arrived 300 ms ago
+  EXPECT_EQ(command(first_number + 19), "execute");  // heartbeat 20 arrived 250 ms ago
 }
 
 TEST_F(BoardLinkTest, LatenessCountsFromTheFirstHeartbeatAtAnyRate) {
@@ -359,7 +359,7 @@ TEST_F(BoardLinkTest, ARefusedNumberIsUsedUp) {
       << "the board answers a duplicate with the reason of its refusal";
   EXPECT_EQ(command(first_number + 4), "STALE");
   EXPECT_EQ(command(first_number + 6), "execute");
-  link.refused(other, first_number + 50, Refusal::range);  // another host: no effect
+  link.refused(other, first_number + 50, Refusal::range);  // from another host, so it has no effect
   EXPECT_EQ(command(first_number + 7), "execute");
   link.refused(ours, first_number + 7 + 65537, Refusal::range);  // outside the window: no effect
   EXPECT_EQ(command(first_number + 8), "execute");
@@ -401,7 +401,7 @@ TEST_F(BoardLinkTest, ReportsWhichHeartbeatStartedTheSession) {
   EXPECT_TRUE(link.first_heartbeat(ours, first));
   EXPECT_EQ(first, first_number + 1);
   EXPECT_FALSE(link.first_heartbeat(other, first));
-  run(1000);  // lost, and resumed
+  run(1000);  // the link is lost and resumed
   heartbeat(first_number + 2, sent.back());
   EXPECT_TRUE(link.first_heartbeat(ours, first));
   EXPECT_EQ(first, first_number + 1);
@@ -472,7 +472,8 @@ TEST_F(BoardLinkTest, AHostThatMayHaveNothingToEchoIsAnswered) {
   EXPECT_EQ(heartbeat(first_number, 99), HeartbeatEffect::unheard);
   connect();
   run(500);
-  // In ACTIVE the controlling host hears the regular heartbeats, except on a new path.
+  // In ACTIVE, the controlling host receives the regular heartbeats, so it gets an answer only on a
+  // new path.
   EXPECT_EQ(heartbeat(first_number + 2, 99), HeartbeatEffect::stale);
   EXPECT_EQ(heartbeat(first_number + 2, 0), HeartbeatEffect::unheard);
   run(1000);
@@ -508,7 +509,7 @@ TEST_F(BoardLinkTest, ReportsExactlyWhenItIsDue) {
   now += 1;
   EXPECT_EQ(link.due_in(now), 0U);
   send_due();
-  EXPECT_EQ(link.due_in(now), 100U);  // for the echo
+  EXPECT_EQ(link.due_in(now), 100U);  // until the board repeats the heartbeat to get an echo
   heartbeat(first_number + 2, sent.back());
   link.set_timing(BoardLink::Timing{500, 120});
   EXPECT_EQ(link.due_in(now), 120U);
@@ -517,7 +518,7 @@ TEST_F(BoardLinkTest, ReportsExactlyWhenItIsDue) {
   EXPECT_EQ(link.due_in(now), 1U);
   now += 1;
   EXPECT_TRUE(link.poll(now));
-  EXPECT_EQ(link.due_in(now), 0U);  // the heartbeat of LOST
+  EXPECT_EQ(link.due_in(now), 0U);  // for the heartbeat of LOST
   send_due();
   EXPECT_EQ(link.due_in(now), 500U);
 }

@@ -17,7 +17,7 @@ struct HostLinkTest : testing::Test {
     link.on_reason(reason, now);
   }
   void booting(SafeReason reason = SafeReason::none) { link.on_booting(reason, now); }
-  // Sends what is due. True if a heartbeat was sent.
+  // Sends a heartbeat if it is due. True if a heartbeat was sent.
   bool send_due() {
     if (!link.heartbeat_due(now)) return false;
     link.heartbeat_sent(now);
@@ -143,7 +143,7 @@ TEST_F(HostLinkTest, NeedsANewSessionIfOnlyTheClockShowsARestart) {
   link.begin_session(7);
   heartbeat();
   const std::uint32_t before = link.take_pnum();
-  link.on_restart();  // or the clock of the host stood still
+  link.on_restart();  // or the clock of the host stopped
   ASSERT_EQ(link.restarts(), 1U);
   EXPECT_EQ(link.echo(), 0U);
   ASSERT_TRUE(link.wants_session());
@@ -204,7 +204,7 @@ TEST_F(HostLinkTest, TheWatchdogStopsTheHeartbeatsOfAHungApplication) {
   EXPECT_TRUE(link.watchdog_expired(now));
   for (int ms = 0; ms < 500; ++ms, ++now) EXPECT_FALSE(send_due());
   heartbeat();
-  EXPECT_FALSE(send_due());  // not even an answer
+  EXPECT_FALSE(send_due());  // also no answer
   EXPECT_GT(link.due_in(now), 0U);
   link.feed(now);
   EXPECT_TRUE(send_due());

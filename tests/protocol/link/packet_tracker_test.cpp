@@ -67,7 +67,7 @@ TEST(PacketTracker, ALatePacketIsADuplicateTheSecondTime) {
 TEST(PacketTracker, RemembersTheLast64Numbers) {
   PacketTracker tracker;
   tracker.on(1000);
-  tracker.on(1064);  // 1000 is now 64 numbers back, 1001 is 63
+  tracker.on(1064);  // 1000 is 64 numbers back, 1001 is 63
   EXPECT_EQ(tracker.on(1001), Arrival::late);
   EXPECT_EQ(tracker.on(1000), Arrival::old);
   EXPECT_EQ(tracker.counters().lost, 62U);
@@ -147,7 +147,7 @@ TEST(PacketTracker, SaysWhichArrivalsAreTheNewest) {
 }
 
 // Packet numbers in any order with duplicates, from any start: the tracker counts each number
-// correctly as long as it remembers it.
+// correctly while it remembers the number.
 TEST(PacketTracker, CountsAnyShuffleWithinItsMemoryExactly) {
   rc::check([](std::uint32_t start) {
     PacketTracker tracker;

@@ -19,7 +19,7 @@ struct WatchersTest : testing::Test {
   Effect ask(Source from, std::uint64_t echo = 0, std::uint32_t rate_hz = 50) {
     return watchers.on_lease(from, rate_hz, echo, false, now);
   }
-  // Sends W; returns the token with which the board answers.
+  // Sends W. Returns the token in the board's answer.
   std::uint32_t told(Source from) {
     now += Watchers::answer_spacing_ms;
     EXPECT_EQ(ask(from), Effect::unproven);

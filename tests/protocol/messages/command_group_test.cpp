@@ -29,7 +29,7 @@ std::string judged(const std::string& fields) {
   return str(name_of(refusal)) + " " + std::to_string(at);
 }
 
-// `count` commands, each for another output.
+// `count` commands for different outputs.
 std::string commands(int count) {
   std::string fields;
   for (int i = 1; i <= count; ++i) {
@@ -57,7 +57,6 @@ TEST(CommandGroup, NamesTheFirstCommandThatCannotBeExecuted) {
       {"O:1,1,1;X:1;", "UNKNOWN 2"},
       {"O:1,1,1;E:HALT;", "UNKNOWN 2"},
       {"O:1,1,1;N:5,SAFE;", "UNKNOWN 2"},
-      // The same output twice.
       {"O:1,1,1;O:1,1,1;", "FORMAT 2"},
       {"S:1,1;O:1,1,1;D:1,1,1;S:2,1;", "FORMAT 4"},
       {"R:1,On;R:1,Off;", "FORMAT 2"},

@@ -15,7 +15,8 @@ namespace {
 
 using test::str;
 
-// The command, read and written again, or the name of its refusal.
+// Reads the command in `text` and writes it again. Returns the name of the refusal if it is
+// refused.
 std::string device_again(const std::string& text) {
   Field field;
   EXPECT_TRUE(read_field(Text(text), field)) << text;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds the secret in a setting, and removes it from datagrams.
+// Finds the secret in a setting, and removes secrets from datagrams.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -88,7 +88,7 @@ RC_GTEST_PROP(Secrets, AreGoneTheFirstTime, (bool is_valid)) {
 }
 
 TEST(Secrets, MaskingStaysWithinItsExtraRoom) {
-  // The secret has one character, and the new checksum has more digits than the old one.
+  // The secret has one character. The new checksum has more digits than the original checksum.
   for (int i = 0; i < 2000; ++i) {
     const std::string bytes = with_crc("C:x,1;PNum:" + std::to_string(i) + ";");
     const std::string result = masked(bytes);

@@ -36,8 +36,8 @@ TEST(Settings, AcceptsNumbersOnlyWithinTheirRange) {
                         Case{"heartbeat", 50, 1000, &Settings::heartbeat_ms},
                         Case{"timeout", 100, 10000, &Settings::timeout_ms}}) {
     Settings settings;
-    settings.heartbeat_ms = 60;   // lower than the smallest timeout,
-    settings.timeout_ms = 10000;  // and longer than the largest heartbeat interval
+    settings.heartbeat_ms = 60;   // less than the smallest timeout
+    settings.timeout_ms = 10000;  // longer than the largest heartbeat interval
     for (const int value : {c.min, c.max}) {
       EXPECT_EQ(set_text(settings, c.key, std::to_string(value)), Refusal::none) << c.key;
       EXPECT_EQ(settings.*c.member, value) << c.key;
@@ -98,7 +98,7 @@ TEST(Settings, OtherKeysAreUnknown) {
   }
 }
 
-// A setting that operator== or the storage forgets is lost at the next start of a Giga.
+// If operator== or the storage omits a setting, the next start of a Giga loses the setting.
 TEST(Settings, EachSettingIsComparedAndStored) {
   char wiring[max_wiring_value];
   const std::string values[] = {"60",

@@ -27,7 +27,7 @@ std::string value_cell_of(const FieldKindRow& kind) {
   return names;
 }
 
-// The names in a cell of that table: "`ENC1` … `ENC4`" means all four.
+// The names in a cell of the same table: "`ENC1` … `ENC4`" means all four.
 std::vector<std::string> names_in(const std::string& cell) {
   std::vector<std::string> names;
   std::istringstream words(cell);

@@ -44,7 +44,7 @@ std::vector<StateField> every_field() {
   return fields;
 }
 
-// Every member is different from zero and from every other member.
+// All members differ from zero and from each other.
 State numbered_state() {
   State state;
   for (int i = 0; i < analog_channels; ++i) state.raw.analog_cv[i] = 1001 + i;
@@ -210,7 +210,7 @@ TEST(State, NumbersOutsideTheRangeOfTheirFieldAreNotSet) {
   }
 }
 
-// The fields of devices that the user connects go into a second datagram.
+// The fields of the user's devices are in the second datagram.
 TEST(State, AllFieldsFitTwoDatagramsAndRoundTrip) {
   const State state = numbered_state();
   FieldSet own;

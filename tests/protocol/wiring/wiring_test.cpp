@@ -52,7 +52,7 @@ struct Case {
   int place;
   WiringFault fault;
   int other = no_signal;  // the index of the other signal
-  int signal = -1;        // the index of the signal with the fault, if it is not this one
+  int signal = -1;        // the index of the signal with the fault, if it differs from the entry
 };
 constexpr int option = Place::option_bit;
 constexpr int none = Place::nowhere;
@@ -128,7 +128,7 @@ TEST(Wiring, ADhb12MayBeOnTheChipOfTheOsmcs) {
   EXPECT_EQ(check(wiring).fault, WiringFault::none);
 }
 
-// Each byte in each place: a wiring from a stranger may hold any.
+// Each byte in each place, because a wiring from a stranger may hold any bytes.
 TEST(Wiring, AnyBytesAreCheckedWithoutACrash) {
   for (int signal = 0; signal < signal_count; ++signal) {
     for (int byte = 0; byte < 256; ++byte) {
@@ -144,7 +144,7 @@ TEST(Wiring, AnyBytesAreCheckedWithoutACrash) {
   }
 }
 
-// variants/GIGA/variant.cpp of ArduinoCore-mbed, commit 2080938.
+// The pins are in variants/GIGA/variant.cpp of ArduinoCore-mbed, commit 2080938.
 TEST(GigaPins, NoTwoHaveTheSamePin) {
   std::set<std::pair<char, int>> pins;
   for (const GigaPin& pin : giga_pins) {

@@ -17,7 +17,6 @@ std::string value_of(const Wiring& wiring) {
   return test::str(write_wiring_value(wiring, out));
 }
 
-// With a right checksum.
 std::string with_checksum(const std::string& text) {
   char crc[9];
   std::snprintf(crc, sizeof crc, "%x", static_cast<unsigned>(crc32(text)));

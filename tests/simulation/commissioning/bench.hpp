@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated board on its own cable, in virtual time: waiting lets the time pass. It counts the
-// milliseconds in which an output was on although nobody had announced it.
+// A simulated board on its own cable, in virtual time. Waiting advances the time. The bench counts
+// the milliseconds in which an output was on without an announcement.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -21,11 +21,11 @@ namespace r4::simulation {
 class Bench final : public commissioning::BoardUnderTest, private test::DrivenSession::Handler {
  public:
   struct Options {
-    Wiring wired = plan_wiring();       // the truth
-    bool new_board = false;             // nobody has confirmed the plan
-    bool knows_wiring = false;          // the truth was given to it
+    Wiring wired = plan_wiring();       // the board's real wiring
+    bool new_board = false;             // the plan is not confirmed
+    bool knows_wiring = false;          // the board has its real wiring in its settings
     std::vector<std::string> broken{};  // words of a scenario
-    bool papers_firmware = false;       // does not say who it is
+    bool papers_firmware = false;       // does not report its identity
   };
   explicit Bench(const Options& options);
 
@@ -61,7 +61,6 @@ class Bench final : public commissioning::BoardUnderTest, private test::DrivenSe
   void pass_millisecond();
   void set_watchdog();
   CommandResult result_of(Ticket ticket);
-  // DrivenSession::Handler
   SendResult transmit(std::size_t, std::string_view datagram, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram& datagram) override;
   void on_identity(const Identity& identity) override;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::commissioning with a simulated person at simulated boards that are right, wired otherwise
-// than the plan, or broken.
+// r4::commissioning with a simulated person at simulated boards that are right, not wired as
+// planned, or broken.
 #include "r4link/commissioning/commissioning.hpp"
 
 #include <fmt/format.h>
@@ -87,10 +87,10 @@ TEST(Commissioning, FindsNothingWrongAtABoardThatKnowsItsOtherWiring) {
 
 struct Fault {
   const char* name;
-  std::vector<std::pair<std::string, std::string>> wired;  // the truth, where it is not the plan
+  std::vector<std::pair<std::string, std::string>> wired;  // places that differ from the plan
   std::vector<std::string> broken;                         // words of a scenario
-  std::vector<std::string> found;                          // all of these, and nothing else
-  bool learns_all = true;                                  // the learnt wiring is the true one
+  std::vector<std::string> found;  // all faults that must be found, and no other fault
+  bool learns_all = true;          // the learnt wiring is the real wiring
 };
 const std::vector<Fault> faults = {
     {"two motors are exchanged",
@@ -356,7 +356,7 @@ TEST(Commissioning, BringsNothingBackAfterItStoodStillAndThePersonLetGo) {
   Bench bench({});
   SimulatedPerson person(bench);
   person.lets_go_after_ms = 200;
-  person.hangs_ms = 3000;  // the board has gone safe for the link, with its setpoints kept
+  person.hangs_ms = 3000;  // the board becomes safe because of the link, with its setpoints kept
   person.otherwise =
       [&](const commissioning::Question& question) -> std::optional<commissioning::Answer> {
     if (question.topic != commissioning::Topic::clear) return std::nullopt;

@@ -155,7 +155,7 @@ Answer SimulatedPerson::answer(const Question& question) {
       bench_.pass(1500);
       break;
     case Topic::address_seen: {
-      // The truth of the chip that the question names first.
+      // The real address of the chip that the question names first.
       for (int i = signals::osmc_chip; i <= signals::dac_chip; ++i) {
         const Place true_place = bench_.model().chips().wiring.places[i];
         if (true_place == plan_wiring().places[i]) continue;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A person at a simulated board, who sees what its motors, relays and servos really do, and answers
-// accordingly.
+// A person at a simulated board, who sees the movements of its motors, relays and servos, and
+// answers accordingly.
 #pragma once
 
 #include <functional>
@@ -24,16 +24,16 @@ class SimulatedPerson final : public commissioning::Person {
   commissioning::Answer await_key(const commissioning::Movement& movement) override;
   bool holds_key() override;
 
-  // Answers in place of the usual one, if it returns one.
+  // If it returns an answer, the answer replaces the usual answer.
   std::function<std::optional<commissioning::Answer>(const commissioning::Question&)> otherwise;
-  std::optional<std::uint32_t> lets_go_after_ms;  // in the next movement
-  std::function<void()> before_key;               // called once, while the next movement is read
-  std::uint32_t hangs_ms = 0;                     // holds_key() takes so long when it becomes false
+  std::optional<std::uint32_t> lets_go_after_ms;  // after the start of the next movement
+  std::function<void()> before_key;  // called once, while the person reads about the next movement
+  std::uint32_t hangs_ms = 0;        // how long holds_key() takes when it becomes false
 
-  // Promises that were broken, in milliseconds.
+  // How long a promise was broken, in milliseconds.
   int unannounced_ms = 0;  // an output was on, and nothing was announced
   int several_ms = 0;      // more than relay 1 and one other output was on
-  int not_ended_ms = 0;    // an output was on 150 ms after the person let go
+  int not_ended_ms = 0;    // an output was on 150 ms after the person released the key
   int movements = 0;
 
  private:
@@ -48,7 +48,7 @@ class SimulatedPerson final : public commissioning::Person {
   double meter(Analog input);
 
   Bench& bench_;
-  bool moving_ = false;  // from the key to the next word
+  bool moving_ = false;  // from the key to the next text
   bool holds_ = false;
   std::uint32_t held_since_ms_ = 0;
   std::uint32_t let_go_ms_ = 0;

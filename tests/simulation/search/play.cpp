@@ -69,7 +69,7 @@ void Play::after(std::uint64_t us, std::function<void()> call) {
 }
 
 void Play::on_event(int index) {
-  // Take the call out first: it may add calls, which may move the elements of calls_.
+  // Move the call out first: it may add calls, which may move the elements of calls_.
   const std::function<void()> call = std::move(calls_[static_cast<std::size_t>(index)]);
   call();
 }
@@ -96,8 +96,8 @@ bool Play::applies(Fault fault) const {
   const Step& step = steps_[static_cast<std::size_t>(fault.step)];
   if (step.at_us >= story_.faults_until_ms * 1000ULL) return false;
   if (is_of_datagram(fault.kind)) {
-    // The host does not run, so these faults change nothing. But a late datagram may find the host
-    // running.
+    // The host does not run, so these faults change nothing. But the host may run when a late
+    // datagram arrives.
     const bool same =
         !step.to_board && !step.alive &&
         (fault.kind == Kind::lost || fault.kind == Kind::twice || fault.kind == Kind::overtaken);
@@ -117,7 +117,7 @@ bool Play::applies(Fault fault) const {
     case Kind::dies:
     case Kind::sleeps:
     case Kind::pauses:
-      // The program that only stops the board ends soon anyway.
+      // The program that only stops the board ends soon, so these faults change nothing.
       return step.first_of_host && step.alive && step.host != story_.hosts;
     case Kind::moves:
       return step.first_of_path && step.alive && is_host;
@@ -214,7 +214,7 @@ void Play::on_sent(const Packet& sent) {
     overtaken_.push_back(sent);
     return;
   }
-  // A path keeps the order of the datagrams that it holds back.
+  // A path keeps the order of the datagrams that it delays.
   const std::uint64_t held_us =
       path.stalled_until_us - std::min(path.stalled_until_us, world_.now_us_);
   deliver_in(std::max(held_us + delay_us, first_us), sent);

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One run of a story with faults, in the world of the link simulator.
 //
-// A step is a datagram that a host or the board sends to the other, numbered from 0 in the order in
-// which they are sent. A fault happens to a datagram or, right after it was sent and before it
-// arrives, to a path, a host or the board.
+// A step is a datagram from a host to the board or back. Steps are numbered from 0 in the order in
+// which they are sent. A fault happens to a datagram, or to a path, a host or the board after the
+// datagram is sent and before it arrives.
 //
 // It checks the promises of the world (world.hpp). From the board's behaviour alone it also checks:
-//    silence   outputs of a host are live only while intact heartbeats of the same process arrive
-//    joined    only the heartbeats of its own host keep a session
-//    resumed   only its own host resumes a session
-//    stranger  only commands of its own host are executed in a session
+//    silence   outputs of a host are live only while intact heartbeats of the same process arrive.
+//    joined    only the heartbeats of its own host keep a session.
+//    resumed   only its own host resumes a session.
+//    stranger  only commands of its own host are executed in a session.
 //    pushed    strangers do not take the board from a host whose heartbeats arrive in time with a
-//              fresh echo
-//    served    while a host is in control, strangers do not prevent that its commands are confirmed
-//    returns   at the end of a run without strangers, a host that runs is in control
+//              fresh echo.
+//    served    while a host is in control, strangers do not prevent confirmations of its commands.
+//    returns   at the end of a run without strangers, a host that runs is in control.
 //
-// With a key, the first copy of a signed datagram that reaches the board counts as its host's,
-// whatever its peer is (docs/design/safety-argument.md). Any further copy counts as the stranger's.
+// With a key, the first arrival of a signed datagram at the board counts as its host's, whatever
+// its peer is (docs/design/safety-argument.md). Later arrivals count as the stranger's.
 #pragma once
 
 #include <cstdint>
@@ -41,15 +41,15 @@ struct Step {
   int path = 0;
   bool passes = false;        // no cut loses this datagram
   bool first = false;         // the first datagram of its event in the world
-  bool first_of_host = true;  // the first of its event from or to this host
-  bool first_of_path = true;  // the first of its event from or to this host on this path
+  bool first_of_host = true;  // the first datagram of its event from or to this host
+  bool first_of_path = true;  // the first datagram of its event from or to this host on this path
   bool alive = false;         // its host runs
   std::string text;           // only with a trace
 };
 
 class Play final : World::Script {
  public:
-  // `confirmed`: the number of commands that are confirmed without faults, if that is known.
+  // `confirmed`: the number of commands that are confirmed without faults, if it is known.
   // `always_pushed`: check `pushed` also without strangers.
   Play(const Story& story, std::vector<Fault> faults, bool keep_trace,
        std::optional<std::uint32_t> confirmed = {}, bool always_pushed = false);
@@ -70,7 +70,6 @@ class Play final : World::Script {
 
   static Schedule schedule_of(const Story& story);
 
-  // World::Script
   void begin() override;
   void end() override;
   void on_event(int index) override;
@@ -131,9 +130,9 @@ class Play final : World::Script {
 
   std::vector<Step> steps_;
   std::uint64_t event_of_step_ = ~std::uint64_t{0};
-  std::vector<std::pair<int, int>> hosts_of_event_;  // host and path of each step of that event
+  std::vector<std::pair<int, int>> hosts_of_event_;  // host and path of each step of the event
   std::vector<std::function<void()>> calls_;
-  std::vector<Packet> overtaken_;  // each waits for the next datagram in its direction
+  std::vector<Packet> overtaken_;  // each packet waits for the next datagram in its direction
   struct Suspended {
     bool keeps = false;  // true: arriving datagrams wait; false: they are lost
     std::vector<Packet> arrived;
@@ -147,24 +146,24 @@ class Play final : World::Script {
   bool executed_ = false;  // the board has executed a command of the process in control
   bool stranger_controlled_ = false;
   bool lost_now_ = false;     // in this event
-  bool may_be_lost_ = false;  // in this event, by a farewell or with the transport
+  bool may_be_lost_ = false;  // in this event, by a farewell or a lost transport
   bool had_owner_ = false;
   std::uint32_t fed_before_ = 0;
-  std::uint64_t good_us_ = 0;  // when the newest heartbeat that must feed came
+  std::uint64_t good_us_ = 0;  // when the newest heartbeat that must feed arrived
   std::map<Process, std::uint64_t> heard_us_;
   std::map<Process, std::uint32_t> newest_;  // the number of the newest heartbeat
   struct Signed {
     Process signer;
     bool has_arrived = false;
   };
-  std::map<std::string, Signed> copied_;  // datagrams that a stranger has copied
+  std::map<std::string, Signed> copied_;  // datagrams that a stranger has duplicated
 
   Stranger stranger_;
-  std::uint32_t stranger_pnum_ = 0;  // of the stranger's own datagrams
+  std::uint32_t stranger_pnum_ = 0;  // number of the stranger's own datagrams
   std::uint32_t first_peer_ = 0;     // the first address of the first host
-  // of the stranger's datagrams that pass for the host's
+  // Number of the stranger's datagrams that pass for the host's datagrams.
   std::uint32_t campaign_pnum_ = 0;
-  static constexpr std::uint32_t bridge_peer = 0xFFFB;  // the bridge, for the board
+  static constexpr std::uint32_t bridge_peer = 0xFFFB;  // the bridge's peer number at the board
   std::unique_ptr<test::ScriptedBridge> bridge_;
   World world_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The acts of a story, and all faults except those of datagrams.
+// The acts of a story, and all faults except the faults of datagrams.
 #include <utility>
 
 #include "play.hpp"
@@ -178,8 +178,8 @@ void Play::when_it_runs(int index, std::function<void()> call) {
   if (host(index).alive) suspended_[index].calls.push_back(std::move(call));
 }
 
-// While the host's computer sleeps, the clocks of its programs stand still, and it receives
-// nothing. After the sleep the host begins another session.
+// While the host sleeps, the clocks of its programs stop, and it receives no datagram. After the
+// sleep the host begins another session.
 void Play::sleep(int index) {
   Host& at = host(index);
   if (!runs(index)) return;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A story with the shipped bridge: hosts and strangers on one side, the board on the other.
+// A story with the shipped bridge. Hosts and strangers are on one side, and the board is on the
+// other side.
 #include <utility>
 
 #include "play.hpp"
@@ -37,7 +38,8 @@ bool Play::bridge_takes(const Packet& arrived) {
   return true;
 }
 
-// Delivers what the bridge has sent to both sides. `packet`: the datagram that it received before.
+// Delivers the datagrams that the bridge has sent to both sides. `packet`: the datagram that the
+// bridge received before.
 void Play::carry_from_bridge(const Packet* packet) {
   for (const auto& sent : std::exchange(bridge_->board->sent, {})) {
     Packet passed;

@@ -76,7 +76,7 @@ void Play::repeat(const std::string& bytes, Process signer) {
   say_bytes(bytes, world_.port_of(story_.paths - 1), Stranger::address);
 }
 
-// True if a living host has this address.
+// True if a running host has this address.
 bool Play::is_taken(std::uint32_t peer) {
   for (const auto& each : world_.hosts_) {
     for (const Host::Place& place : each->places) {
@@ -97,7 +97,7 @@ void Play::carry_on(Fault::Kind kind, std::uint8_t port, std::uint32_t peer) {
     return;
   }
   if (kind == Fault::Kind::stranger_competes) {
-    // Alternately with its own SID and as a paper host.
+    // Alternates between its own SID and a paper host.
     const char* const own = stranger_pnum_ % 4 < 2 ? "" : Stranger::own_name;
     const std::uint32_t first = 0x9000'0000U;
     say(fmt::format("{}H:ROS2-R4;PNum:{};T:{};", own, first + ++stranger_pnum_, echo), port, peer);

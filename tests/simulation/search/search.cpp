@@ -15,7 +15,7 @@
 namespace r4::simulation {
 namespace {
 
-// The faults that may come next in that run.
+// The faults that may come next in this run.
 std::vector<Fault> next_faults(const Play& play, const std::vector<Fault>& faults) {
   std::vector<Fault> next;
   Fault first{0, Fault::Kind::lost};
@@ -61,7 +61,8 @@ class Searcher {
   Search found;
 
  private:
-  // True if the finding needs strangers: delays and losses alone do not have the same effect.
+  // True if the finding needs strangers, because delays and losses alone do not have the same
+  // effect.
   bool is_strangers_doing(std::vector<Fault> faults) const {
     std::erase_if(faults, [](const Fault& fault) { return is_strangers(fault.kind); });
     return Play(story_, faults, false, {}, true).run().violation.empty();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every combination of few faults in a story, each in a separate run.
+// Every combination of few faults in a story, each combination in a separate run.
 //
-// The second fault happens at a step of the run with the first fault, and so on. Faults come in the
-// order of their steps; at the same step, in the order of their kinds. A datagram has at most one
-// fault. A schedule that breaks a promise gets no further faults. Therefore the search is finite,
-// and complete for these kinds of faults.
+// The second fault happens at a step of the run with the first fault, and later faults likewise.
+// Faults are in the order of their steps, and of their kinds at the same step. A datagram has at
+// most one fault. A schedule that breaks a promise gets no further faults. Therefore the search is
+// finite, and complete for these kinds of faults.
 #pragma once
 
 #include <cstdint>
@@ -16,27 +16,26 @@
 
 namespace r4::simulation {
 
-// A schedule that breaks a promise.
 struct Finding {
   std::vector<Fault> faults;
   std::string violation;
 };
 
 struct Search {
-  std::size_t steps = 0;                 // of the story without faults
-  std::vector<std::uint64_t> schedules;  // with no fault, one fault, two faults, …
+  std::size_t steps = 0;                 // datagrams of the story without faults
+  std::vector<std::uint64_t> schedules;  // schedules with no fault, one fault, two faults, …
   std::vector<Finding> findings;         // in the order of the search
 };
 
 // Uses all processors.
 Search search(const Story& story, int most_faults);
 
-// Describes a schedule: the events and faults in plain words, the broken promise, and the command
-// that runs it again.
+// Describes a schedule in plain words: its events and faults, the broken promise, and the command
+// that repeats the schedule.
 std::string tell(const Story& story, const Finding& finding);
 // The broken promise and the kinds of faults that break it, for example "joined: stranger-joins".
-// If strangers take part, only their faults are listed. Also the number of such schedules, and the
-// first of them. Omitted if fewer faults of these kinds already break the same promise.
+// If strangers take part, only their faults are listed. Also holds the number of such schedules and
+// the first schedule. A kind is omitted if fewer faults of the same kinds break the same promise.
 struct FoundKind {
   std::size_t schedules = 0;
   Finding first;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The promises of docs/design/safety-argument.md with every combination of few faults in short stories. R4_FAULTS
-// sets how many faults at once. Without it that is 1, but 2 where R4_SCHEDULES asks for 100,000
-// schedules of the random simulator or more, or for 10,000 and the story is short. R4_STORY and
-// R4_STORY_FAULTS run one schedule again and print its trace.
+// The promises of docs/design/safety-argument.md with every combination of few faults in short
+// stories. R4_FAULTS sets the highest number of faults at once. Its default is 2 if R4_SCHEDULES
+// (30,000 by default) is at least 100,000, or at least 10,000 for a story with few schedules.
+// Otherwise its default is 1. R4_STORY and R4_STORY_FAULTS repeat one schedule and print its trace.
 #include "search.hpp"
 
 #include <fmt/format.h>

@@ -6,8 +6,8 @@ namespace {
 
 using Kind = Act::Kind;
 
-// A host is in control after 200 ms. It sends heartbeats every 250 ms, the board every 500 ms, and
-// states every 200 ms.
+// A host is in control after 200 ms. The host sends heartbeats every 250 ms. The board sends
+// heartbeats every 500 ms, and states every 200 ms.
 std::vector<Story> all() {
   std::vector<Story> all;
   const auto add = [&all](const char* name, const char* text, std::uint32_t faults_until_ms,

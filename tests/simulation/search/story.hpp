@@ -10,19 +10,19 @@
 
 namespace r4::simulation {
 
-// Something that a program or a person in the story does.
+// An act of a program or a person in the story.
 struct Act {
   enum class Kind : std::uint8_t {
     start,    // the host process begins
     command,  // the host commands one output
-    group,    // … several at once
-    stop,     // the host asks for an emergency stop
-    clear,    // … and clears it
+    group,    // the host commands several outputs at once
+    stop,     // the host sends an emergency stop
+    clear,    // the host clears its stop
     leave,    // the host sends a farewell and ends
-    kill,     // the host process dies
+    kill,     // the host process is killed
     reboot,   // the board restarts
-    sleep,    // the host's computer sleeps for 1.5 s
-    cut,      // the path carries nothing for 1.3 s
+    sleep,    // the host sleeps for 1.5 s
+    cut,      // the path carries no datagram for 1.3 s
   };
   std::uint32_t at_ms;
   Kind kind;
@@ -33,17 +33,17 @@ struct Story {
   const char* name;
   const char* text;  // what happens, in plain words
   std::vector<Act> acts;
-  // Datagrams that are sent later have no faults. A board and hosts recover from two faults in the
-  // time that follows.
+  // Later datagrams have no faults. In the time after this, a board and hosts recover from two
+  // faults.
   std::uint32_t faults_until_ms = 0;
   static constexpr std::uint32_t recovery_ms = 3000;
   int hosts = 1;
   int paths = 1;
-  // true: all paths are peers at one port of the board; false: each has its own port
+  // true: all paths are peers at one port of the board; false: each path has its own port
   bool one_port = false;
-  // bit n: the first host is on path n. Other hosts are on the last path
+  // Bit n: the first host is on path n. Other hosts are on the last path.
   int paths_of_first = 0xFF;
-  bool one_address = false;  // the board hears all hosts from one peer
+  bool one_address = false;  // all hosts are one peer of the board
   bool watched = false;      // the last host only watches
   bool keys = false;         // the board has a key for each host
   bool is_short = false;     // the story has few schedules
@@ -51,7 +51,7 @@ struct Story {
 };
 
 const std::vector<Story>& stories();
-// For GoogleTest, which would otherwise print the bytes.
+// GoogleTest would otherwise print the bytes.
 inline void PrintTo(const Story& story, std::ostream* out) { *out << story.name; }
 
 struct Fault {
@@ -60,9 +60,9 @@ struct Fault {
     lost,
     twice,           // arrives twice in a row
     again_late,      // arrives, and again 300 ms later
-    again_too_late,  // … and again 1.3 s later
+    again_too_late,  // arrives, and again 1.3 s later
     late,            // arrives after 300 ms
-    too_late,        // … after 1.3 s
+    too_late,        // arrives after 1.3 s
     overtaken,       // arrives after the next datagram in its direction
     // Faults of the path on which the datagram is sent.
     cut,
@@ -85,8 +85,7 @@ struct Fault {
     stands_still,
     other_stops,
     bridge_restarts,
-    // Acts of a stranger, which knows the datagrams that the board sends to everyone and to
-    // watchers.
+    // Acts of a stranger, which has the datagrams that the board sends to everyone and to watchers.
     stranger_beats,
     stranger_drives,
     stranger_leaves,
@@ -110,7 +109,8 @@ const char* text_of(Fault::Kind kind);
 constexpr bool is_of_datagram(Fault::Kind kind) { return kind <= Fault::Kind::overtaken; }
 constexpr bool is_strangers(Fault::Kind kind) { return kind >= Fault::Kind::stranger_beats; }
 
-// Between faults and text such as "17:lost 31:restarts". Throws std::invalid_argument.
+// Converts faults to text such as "17:lost 31:restarts", and back. faults_from() throws
+// std::invalid_argument.
 std::string to_text(const std::vector<Fault>& faults);
 std::vector<Fault> faults_from(std::string_view text);
 

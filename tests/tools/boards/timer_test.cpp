@@ -46,8 +46,8 @@ TEST(CommandTimer, ATaskMayReplaceItself) {
   EXPECT_EQ(ran, "ab");
 }
 
-// Both tasks are due, and the loop calls the first. The first task cancels the second, or destroys
-// its timer.
+// Both tasks are due, and the loop calls the first task. The first task cancels the second task, or
+// destroys its timer.
 TEST(CommandTimer, RunsNoTaskAfterACancelEvenIfTheTaskWasDue) {
   for (const bool destroyed : {false, true}) {
     asio::io_context io;

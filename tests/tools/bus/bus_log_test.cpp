@@ -13,14 +13,14 @@
 namespace r4::tool {
 namespace {
 
-// A dump that the test writes, and the lines that are printed for it.
+// A dump that the test writes, and the lines that are printed for the dump.
 struct Dump {
   void frame(std::uint32_t id, std::string_view hex, const char* interface = "can0") {
     log.on_line(++line, fmt::format("({}.{:06}) {} {:03X}#{}", at_us / 1000000, at_us % 1000000,
                                     interface, id, hex));
     at_us += 250;
   }
-  // The frames of a datagram, those after the first with an answer of `flow_control_id`.
+  // Appends the frames of a datagram. An answer of `flow_control_id` follows the first frame.
   void datagram(std::uint32_t id, const std::string& bytes, std::uint32_t flow_control_id = 0,
                 std::size_t lose = 999) {
     std::vector<std::string> frames{fmt::format("1{:03X}", bytes.size())};

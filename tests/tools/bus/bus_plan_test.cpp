@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The results of `r4 bus`, compared with the bus model. The two share only the function that counts
-// the bits of a frame.
+// The results of `r4 bus`, compared with the bus model. Command and model share only the function
+// that counts the bits of a frame.
 #include "tools/r4/bus/bus_plan.hpp"
 
 #include <gtest/gtest.h>
@@ -101,7 +101,7 @@ TEST(BusPlan, ABusThatCannotCarryTheHeartbeatsHasRoomForNoBoard) {
   EXPECT_EQ(highest_rate(plan, 0.8), 0U);
 }
 
-// Longer than one datagram can be: sent in parts, as the board sends it.
+// Longer than one datagram can be, so the board sends it in parts.
 TEST(BusPlan, SplitsAllFieldsLikeTheBoard) {
   BusPlan plan = plan_for(1, false);
   plan.fields = FieldSet::all();

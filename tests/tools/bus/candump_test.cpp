@@ -175,7 +175,7 @@ TEST(Candump, AcceptsAnyBytesWithoutCrashing) {
     for (auto n = random() % 4; n != 0 && !text.empty(); --n) {
       text[random() % text.size()] = static_cast<char>(random());
     }
-    // an exact copy, so that a sanitizer finds a read beyond its end
+    // An exact copy, so that a sanitizer finds a read beyond its end.
     const std::vector<char> exact(text.begin(), text.end());
     CandumpLine line;
     if (read_candump_line({exact.data(), exact.size()}, line) == CandumpError::none) {

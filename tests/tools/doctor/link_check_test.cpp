@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The findings about a link that was heard for a while.
+// The findings about a link from which states were received for a while.
 #include "tools/r4/doctor/link_check.hpp"
 
 #include <gtest/gtest.h>

@@ -9,7 +9,6 @@
 namespace r4::test {
 namespace {
 
-// The lines of a recording that contain datagrams.
 std::string datagram_lines(const std::string& native) {
   std::string lines;
   for (std::size_t at = 0, end = 0; at < native.size(); at = end + 1) {

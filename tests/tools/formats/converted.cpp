@@ -44,7 +44,7 @@ std::string generated_recording(unsigned seed, int records) {
     if (what == 5) {
       bytes.clear();
       for (unsigned size = below(3000); size > 0; --size) bytes += static_cast<char>(below(256));
-      // not a setting, because its value might be a secret
+      // Random bytes must not contain a setting, because its value might be a secret.
       std::replace(bytes.begin(), bytes.end(), 'C', 'c');
     }
     if (what == 6) native += "# a comment \xff \\x20\n";

@@ -31,7 +31,7 @@ struct Converted {
 };
 
 // The result of `r4 convert` for the bytes of a file. `from` and `to` are the endings of both
-// files. The bytes are fed in pieces of this size.
+// files. The bytes are read in pieces of this size.
 inline Converted converted(std::string_view bytes, const std::string& from, const std::string& to,
                            std::size_t piece = 1000, std::vector<Device> devices = {},
                            const tool::SourceOptions& options = {}) {
@@ -70,7 +70,7 @@ inline std::string and_back(const std::string& native, const std::string& by) {
 std::string recorded_capture(const std::string& url = "udp://192.168.0.125");
 
 // A recording of this many records of three paths, generated from a seed: datagrams, damaged
-// datagrams, random bytes, events, comments, paths that get a name, and times that go back.
+// datagrams, random bytes, events, comments, paths that get a name, and times that decrease.
 std::string generated_recording(unsigned seed, int records);
 
 }  // namespace r4::test

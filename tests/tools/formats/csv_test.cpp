@@ -143,7 +143,7 @@ TEST(Csv, HasTheRecordedDevicesOfEachPath) {
   EXPECT_TRUE(lines[3].ends_with(",x5d98,,"))
       << lines[3] << ": these slots belong to the other board";
   EXPECT_TRUE(csv.left_out.find("odd@0x40:5, line 1") != std::string::npos) << csv.left_out;
-  // Devices named on the command line replace the recorded devices, on every path.
+  // Devices named on the command line replace the recorded devices on every path.
   const Converted named =
       converted(recording, ".r4log", ".csv", 1000, {Device::from("ina219@0x40:3")});
   EXPECT_TRUE(lines_of(named.bytes)[2].ends_with(",,,,"));
@@ -177,7 +177,7 @@ TEST(Csv, ConditionsOfADeviceUseItsOwnPath) {
                        with_crc(fields + "PNum:1;T:1010;")});
   };
   state(1, "I2C2:1000,0,x20;");    // the magnet is detected
-  state(2, "I2C1:1000,0,x0400;");  // the status of this magnet was not read yet
+  state(2, "I2C1:1000,0,x0400;");  // the status of this magnet has not been read yet
   const auto lines = lines_of(converted(all, ".r4log", ".csv").bytes);
   ASSERT_EQ(lines.size(), 3U);
   EXPECT_NE(lines[2].find("x0400,"), std::string::npos) << lines[2];

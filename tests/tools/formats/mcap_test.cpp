@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// MCAP of a recording, and back. tests/integration/test_convert.py tests the checksums and indexes.
+// Conversion of a recording to MCAP, and back. tests/integration/test_convert.py tests the
+// checksums and indexes.
 #include "tools/r4/formats/mcap/mcap.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// pcapng of a recording and back, and captures of other programs.
+// Conversion of a recording to pcapng and back, and captures of other programs.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -77,7 +77,7 @@ TEST(Pcapng, LosesOnlyDamagedBlocks) {
   const std::string native = recorded_capture();
   const std::string packets = converted(native, ".r4log", ".pcapng").bytes;
   const auto lines = std::count(native.begin(), native.end(), '\n');
-  // A wrong byte at any place after the interfaces: at most two records are missing, and the damage
+  // A wrong byte at any place after the interfaces. At most two records are missing, and the damage
   // is reported.
   for (std::size_t at = packets.find("AIN24"); at < packets.size(); at += 7) {
     std::string damaged = packets;
@@ -178,7 +178,7 @@ TEST(Pcap, ReadsCanFramesOfCookedCapturesInEitherByteOrder) {
       EXPECT_TRUE(contains(native, fmt::format("# path 1 can://if4?node={}\n", node))) << native;
       EXPECT_TRUE(contains(native, " 1> abc\n")) << node;
     }
-    // The number of a stop is valid in either byte order: an earlier frame shows the order.
+    // The number of a stop is valid in either byte order. An earlier frame shows the order.
     const std::string stop = can_frame(0x80400083, "", order);
     const std::string native =
         native_of(pcap(ByteOrder::little, 276, cooked(4, can_frame(0x183, data, order))) +
@@ -191,7 +191,7 @@ TEST(Pcap, DistinguishesTheInterfacesOfACookedCapture) {
   const auto half = [](std::uint32_t interface, const std::string& data) {
     return cooked(interface, can_frame(0x403, data, ByteOrder::little));
   };
-  // Two datagrams of eight bytes at the same time, one on each bus.
+  // Two datagrams of eight bytes at the same time, one datagram on each bus.
   std::string file = pcap(ByteOrder::little, 276,
                           half(4, std::string("\x10\x08"
                                               "ABCDEF")));
@@ -219,9 +219,9 @@ TEST(Pcap, ReadsAPacketOnceThatPassedTwoInterfaces) {
   };
   std::string same = ipv4(udp(2018, 2390, "PNum:1;"));
   EXPECT_EQ(count_of(same, 404800), 1);
-  same[8] = '\x3F';  // a forwarded packet: smaller time to live
+  same[8] = '\x3F';  // a forwarded packet has a smaller time to live
   EXPECT_EQ(count_of(same, 404800), 1);
-  EXPECT_EQ(count_of(same, 504800), 2);  // the same text again
+  EXPECT_EQ(count_of(same, 504800), 2);  // a repetition of the text
   EXPECT_EQ(count_of(ipv4(udp(2018, 2390, "PNum:2;")), 404800), 2);
   same[5] = '\x07';  // the id of the IP packet
   EXPECT_EQ(count_of(same, 404800), 2);
@@ -272,14 +272,13 @@ TEST(Pcapng, ReadsTimesOfEveryResolutionExactly) {
   EXPECT_TRUE(contains(native_at(0, 1795468293), "1795468293.000000 1<"));
   EXPECT_TRUE(contains(native_at(9, 1795468293404765999), "1795468293.404765 1<"));
   EXPECT_TRUE(contains(native_at(0x80 | 20, (one << 50) + (one << 18)), "1073741824.250000 1<"));
-  // With the finest ticks, 64 bits end a few seconds after 1970.
+  // With the finest ticks, times of 64 bits end a few seconds after 1970.
   EXPECT_TRUE(contains(native_at(18, 1'500'000'000'000'000'000), "1.500000 1<"));
   EXPECT_TRUE(contains(native_at(18, 1'000'001'000'000'000'000), "1.000001 1<"));
   EXPECT_TRUE(contains(native_at(0x80 | 62, 7 * (one << 60)), "1.750000 1<"));
   EXPECT_TRUE(contains(native_at(0x80 | 62, ~std::uint64_t{0}), "3.999999 1<"));
 }
 
-// The blocks of a pcapng.
 std::vector<std::string> blocks_of(const std::string& file) {
   std::vector<std::string> blocks;
   for (std::size_t at = 0; at < file.size(); at += blocks.back().size()) {
@@ -289,7 +288,7 @@ std::vector<std::string> blocks_of(const std::string& file) {
 }
 
 // The packets of two captures in turn, in the order in which mergecap writes packets with equal
-// times. Each capture has its own interfaces, or both share the interfaces of the first.
+// times. Each capture has its own interfaces, or both share the interfaces of the first capture.
 std::string merged_by_mergecap(const std::string& a, const std::string& b, bool own) {
   std::string head = blocks_of(a)[0], packets;
   std::vector<std::string> left, right;
@@ -343,7 +342,7 @@ TEST(Pcapng, RefusesRecordingsMergedByMergecap) {
     EXPECT_TRUE(contains(problem_of([&] { converted(file, ".pcapng", ".r4log"); }).reason,
                          "several recordings are mixed"));
   }
-  // Concatenated recordings can be read, one section each.
+  // Concatenated recordings can be read, with one section for each recording.
   EXPECT_EQ(native_of(packets("udp://a") + packets("udp://b")),
             recorded_capture("udp://a") + recorded_capture("udp://b"));
 }

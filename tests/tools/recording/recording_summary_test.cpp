@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The summary that `r4 info` prints for a recording.
 #include "tools/r4/recording/recording_summary.hpp"
 
 #include <gtest/gtest.h>

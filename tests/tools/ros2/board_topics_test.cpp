@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The topics of a board whose states arrive in several datagrams. A link that carries whole states
-// cannot test this.
+// cannot test this case.
 #include "tools/r4/ros2/board_topics.hpp"
 
 #include <gtest/gtest.h>
@@ -72,7 +72,7 @@ class JointStates : public ::testing::Test {
   std::uint32_t boot = 0;
 };
 
-// 508 bytes, the limit on the Giga's WiFi.
+// 508 bytes is the limit of the Giga's WiFi.
 TEST_F(JointStates, AStateInSeveralDatagramsIsOneSample) {
   state.raw.encoder_hz[0] = 4096;
   state.raw.encoder_hz[1] = 2048;

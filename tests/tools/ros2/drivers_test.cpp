@@ -136,7 +136,7 @@ TEST(Ros2Drivers, AStopOfAPublisherIsRepeatedUntilConfirmed) {
   ASSERT_EQ(stop.commands.size(), 1U) << "the first stop may have been lost";
   EXPECT_EQ(to_text(stop.commands[0]), "O:0,1,1");
   EXPECT_FALSE(stop.missed) << "no publisher has disappeared";
-  // a publisher that drives with 0 repeats its command
+  // A publisher that drives with 0 repeats its command.
   driven.sent(Command::osmc(1, Pwm(0), Direction::forward));
   driven.drivers.stopped(stop);
   EXPECT_EQ(driven.to_stop(), Texts{});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Samples of the graph as the loop receives them, sent by Cyclone DDS within this process.
+// The loop receives samples that Cyclone DDS sends within this process.
 #include "tools/r4/ros2/graph/inbox.hpp"
 
 #include <gtest/gtest.h>
@@ -66,7 +66,6 @@ class InboxTest : public ::testing::Test {
     const BoolMessage message{1};
     ASSERT_EQ(dds_write(writer.get(), &message), 0);
   }
-  // Runs the loop until is_so() is true.
   bool until(const std::function<bool()>& is_so) {
     const auto deadline = Clock::now() + 10s;
     while (!is_so() && Clock::now() < deadline) {
@@ -100,7 +99,7 @@ TEST_F(InboxTest, DeliversTheLastSampleOfAPublisherBeforeItsEnd) {
   taken.clear();
   write_duty(writer, 7);
   writer.reset();
-  const auto deadline = Clock::now() + 10s;  // the loop is busy meanwhile
+  const auto deadline = Clock::now() + 10s;  // the loop is busy during this time
   while (dds_get_matched_publications(duty_reader, nullptr, 0) != 0 && Clock::now() < deadline) {
     std::this_thread::yield();
   }
@@ -117,13 +116,13 @@ TEST_F(InboxTest, NamesThePublisherOfASample) {
   EXPECT_EQ(writers[0], id_of(writer.get()));
 }
 
-// Even after many stops, a later sample waits for one turn of the loop only, not for one turn per
+// Even after many stops, a later sample waits for only one turn of the loop, not for one turn per
 // stop.
 TEST_F(InboxTest, StopsDoNotDelayOtherSamples) {
   const Entity stops = writer_of<BoolMessage>("rt/stop");
   const Entity duties = writer_of<Float32Message>("rt/duty");
   ASSERT_TRUE(until([&] { return is_matched(stops) && has("left 1"); }));
-  constexpr int many = 500;  // 5 s if each needed a turn
+  constexpr int many = 500;  // 5 s if each stop needed a turn
   for (int i = 0; i < many; ++i) {
     taken.clear();
     write_stop(stops);

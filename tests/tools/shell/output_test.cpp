@@ -18,7 +18,7 @@
 namespace r4::tool {
 namespace {
 
-// Standard output is a pipe while this object lives.
+// Standard output is a pipe while this object exists.
 class PipedOutput {
  public:
   explicit PipedOutput(int flags = 0) {
@@ -83,7 +83,7 @@ void print_to_nobody() {
   PipedOutput pipe;
   pipe.close_reader();
   print_text("the board has stopped\n");
-  print_text("more\n");  // after one failure, output is not tried again and does not throw
+  print_text("more\n");  // after one failure, there is no further attempt and no exception
   try {
     require_output();
   } catch (const Error& error) {

@@ -66,7 +66,7 @@ TEST(WebAccess, ParsesHostNames) {
   }
 }
 
-// A proxy passes on the name that the browser asked for, or uses the address that it was given.
+// A proxy passes on the name that the browser requested, or uses its configured address.
 TEST(WebAccess, ServesPagesUnderTheGivenNames) {
   const Access access("127.0.0.1", {"robot.example", "lab.example:8443"}, "secret", {});
   for (const char* host :

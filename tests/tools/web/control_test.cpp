@@ -50,7 +50,7 @@ TEST(WebControl, EndsWhenTheMessagesOfItsHolderAreOld) {
   Control control;
   EXPECT_TRUE(control.take(1, 1000ms));
   EXPECT_TRUE(control.alive(1, 1100ms, 1110ms));
-  // Old messages keep arriving, as over a network that delays messages.
+  // Old messages arrive repeatedly, as over a network that delays messages.
   for (auto now = 1110ms; now < 1600ms; now += 10ms) {
     EXPECT_FALSE(control.alive(1, 1100ms, now));
     EXPECT_FALSE(control.alive(1, 900ms, now));

@@ -19,7 +19,7 @@ constexpr std::uint64_t second_ns = 1000000000;
 CanFrame frame(std::uint32_t id, const std::string& hex = "55 55") { return frame_of(id, hex); }
 std::uint64_t bits(const CanFrame& frame) { return total(can_bits(frame)); }
 
-// A bus with a node that listens and records the frames.
+// A bus with a node that receives and records the frames.
 struct Bench {
   explicit Bench(const CanBusOptions& options = {}) : bus(options) {
     CanNodeOptions listener;
@@ -132,7 +132,8 @@ TEST(CanBusModel, ADamagedFrameIsSentAgainAndCounted) {
   bench.bus.run_until(second_ns);
   EXPECT_EQ(bench.ids(), (Ids{0x100}));
   EXPECT_EQ(bench.bus.traffic().at(0x100).failed, 2U);
-  // 7 bits of flags, 8 of delimiter and 3 of intermission replace the last 11 bits of the frame.
+  // 7 bits of flags, 8 bits of delimiter and 3 bits of intermission replace the last 11 bits of the
+  // frame.
   EXPECT_EQ(bench.bus.busy_ns(), (3 * bits(frame(0x100)) + 2 * 7) * bit_ns);
   EXPECT_EQ(bench.bus.transmit_errors(node), 2 * 8 - 1U);
   EXPECT_EQ(bench.bus.receive_errors(0), 2 - 1U);
@@ -150,9 +151,9 @@ TEST(CanBusModel, ASenderBecomesPassiveAfter16ErrorsAndBusOffAfter32) {
   using enum CanNodeState;
   EXPECT_EQ(states, (std::vector<CanNodeState>{passive, bus_off, active}));
   EXPECT_EQ(bench.bus.traffic().at(0x100).failed, 32U);
-  // A passive node waits for 8 bits before its next attempt: after the 16th to the 31st error.
+  // After the 16th to the 31st error, a passive node waits for 8 bits before its next attempt.
   const std::uint64_t until_off = 32 * (bits(frame(0x100)) + 7) + 16 * 8;
-  // 128 runs of 11 recessive bits; the end of the last error frame is the first run.
+  // 128 runs of 11 recessive bits. The end of the last error frame is the first run.
   const std::uint64_t back = until_off - 11 + std::uint64_t{128 * 11};
   ASSERT_EQ(bench.heard.size(), 1U);
   EXPECT_EQ(bench.heard[0].at_ns, (back + bits(frame(0x100)) - 3) * bit_ns);
@@ -167,7 +168,7 @@ TEST(CanBusModel, AFrameEndsARunOfRecessiveBits) {
   bench.bus.corrupt_next(32);
   const std::uint64_t until_off = (32 * (bits(frame(0x100)) + 7) + 16 * 8) * bit_ns;
   // The other frame begins ten bits after the bus is free, so a run of 21 bits counts once. The end
-  // of the other frame begins a new run.
+  // of the other frame begins another run.
   bench.bus.at(until_off + 10 * bit_ns, [&] { bench.bus.send(other, frame(0x200)); });
   bench.bus.run_until(second_ns);
   ASSERT_EQ(bench.heard.size(), 2U);

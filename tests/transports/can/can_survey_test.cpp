@@ -25,7 +25,7 @@ struct Bus {
     survey.on_stop([this] { ++stops; });
   }
 
-  // Sends a datagram of the board; the survey does not hear frame `without`.
+  // Sends a datagram of the board. The survey does not receive frame `without`.
   void say(Text datagram, int without = -1) {
     ASSERT_TRUE(board.begin(datagram, now_us));
     CanFrame frame{};
@@ -139,7 +139,7 @@ TEST(CanSurvey, ReportsWhyABoardIsSafe) {
   frame.data[0] = 99;
   bus.survey.on_frame(frame, bus.now_us);
   EXPECT_EQ(bus.survey.board(3).reason, SafeReason::fault);
-  frame.size = 0;  // an empty frame names no reason
+  frame.size = 0;  // an empty frame has no reason
   bus.survey.on_frame(frame, bus.now_us);
   EXPECT_EQ(bus.survey.board(3).reason, SafeReason::fault);
 }

@@ -78,8 +78,8 @@ TEST(CanTurn, ListensAgainWhenTheBusIsUpAgain) {
   EXPECT_TRUE(turn.others());
 }
 
-// Two hosts that begin in the same millisecond both fall silent. One of them returns first and
-// keeps the turn.
+// Two hosts that begin in the same millisecond both become silent. One host returns first and keeps
+// the turn.
 TEST(CanTurn, GoesToOneOfTwoHostsThatBeginTogether) {
   for (std::uint32_t seed = 1; seed <= 100; ++seed) {
     CanTurn turns[] = {CanTurn(seed), CanTurn(seed + 1000)};

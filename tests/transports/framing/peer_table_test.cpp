@@ -120,7 +120,7 @@ TEST(PeerTable, KeepsEveryPeerOfTheControllingHost) {
   for (int i = 0; i < 1000; ++i) peers.heard(100 + i);
   EXPECT_EQ(peers.heard(1), first);
   EXPECT_EQ(peers.heard(2), second);
-  peers.hold(Peers::nobody);  // the host may come back
+  peers.hold(Peers::nobody);  // the host may reconnect
   for (int i = 0; i < 1000; ++i) peers.heard(100 + i);
   EXPECT_EQ(peers.heard(2), second);
   peers.hold(first);

@@ -25,7 +25,7 @@ struct OnItsWay {
   bool operator==(const OnItsWay&) const = default;
 };
 
-// Sends a datagram of 20 bytes every millisecond; returns the datagrams that arrive with their
+// Sends a datagram of 20 bytes every millisecond. Returns the datagrams that arrive, with their
 // times.
 std::vector<OnItsWay> arrivals(const std::string& how, int count, ImpairmentCounters& counters,
                                std::uint64_t stream = 1) {
@@ -70,7 +70,7 @@ TEST(Impairment, HasTheStatedEffectsAndRepeatsThemForTheSameSeed) {
         each.bytes) {
       continue;  // damaged
     }
-    // the number is damaged
+    // The number is damaged.
     if (each.at < number * 1ms + 10ms || each.at > number * 1ms + 30ms) continue;
     least = std::min(least, each.at - number * 1ms);
     most = std::max(most, each.at - number * 1ms);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The carriers serial and pty, connected by a real pseudo-terminal, and each with a terminal of the
-// test.
+// The carriers serial and pty, connected by a real pseudo-terminal, and each carrier with a
+// terminal of the test.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -284,11 +284,11 @@ TEST_F(SerialPtyTest, GivesAStalledReaderARecentStateFirst) {
   open_board();
   const FileDescriptor reader = open_raw(board->name().substr(4));
   ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
-  // Ages count in states, not in time: a machine that stands still sends none.
+  // Ages count in states, not in time, because a machine with a standstill sends no states.
   constexpr int period_ms = 10;
   std::size_t sent = 0;
   std::size_t oldest = 0;
-  // Stalls of different lengths and phases; a state every 10 ms, a heartbeat every 50 ms.
+  // Stalls of different lengths and phases, with a state every 10 ms and a heartbeat every 50 ms.
   for (const int stall_ms : {5, 35, 41, 47, 53, 120, 250, 503}) {
     for (int left_ms = stall_ms; left_ms > 0; left_ms -= period_ms) {
       if (sent % 5 == 0) board->send("heartbeat", Priority::normal);
@@ -347,7 +347,7 @@ TEST_F(StalledBoardTest, LetsAStopOvertakeWaitingLines) {
   EXPECT_EQ(host->send("state 2", Priority::state), SendResult::sent);
   EXPECT_EQ(host->send("stop", Priority::stop), SendResult::sent);
   const auto lines = read_until("state 2");
-  // The system holds whole lines and the unfinished one. Then the stop follows, then the 64 waiting
+  // The system holds whole lines and one unfinished line. The stop follows, then the 64 waiting
   // lines.
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(sent) + 2);
   const auto in_system = static_cast<std::size_t>(sent - 64);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program that holds a transport, and the actions that other programs may take with it.
+// A program that holds a transport, and how other programs may use the transport.
 #include "transports/share/share_holder.hpp"
 
 #include <fmt/format.h>
@@ -36,7 +36,7 @@ class ShareHolderTest : public SharedTransportTest {
     EXPECT_TRUE(connection);
     return connection;
   }
-  // A connection after its hello, as a sharing program.
+  // A connection as a sharing program, after its hello.
   FileDescriptor raw_watcher() {
     FileDescriptor connection = raw();
     EXPECT_EQ(send_message(connection.get(), Letter::hello, ShareMessage::version), 0);
@@ -151,7 +151,7 @@ TEST_F(ShareHolderTest, RefusesASeventeenthProgramUntilAnotherEnds) {
   EXPECT_EQ(one_too_many->heard.last(Kind::down)->problem.text(),
             "device:: 16 programs share it already, as many as may; end one of them; its place is "
             "free at once");
-  run_for(io, 1200ms);  // the program asks again and gets the same answer
+  run_for(io, 1200ms);  // the program tries again and gets the same answer
   EXPECT_EQ(one_too_many->heard.count(Kind::down), 1U);
   device.deliver("not for it");
   sharers.pop_back();
@@ -163,13 +163,13 @@ TEST_F(ShareHolderTest, RefusesASeventeenthProgramUntilAnotherEnds) {
 TEST_F(ShareHolderTest, PassesAndConfirmsTheStopOfASeventeenthProgram) {
   const auto holder = opened(BoardRole::control);
   const auto sharers = raw_watchers(ShareHolder::most_served);
-  // r4 stop does the same.
+  // `r4 stop` also opens the transport as a watcher.
   const auto stopper = opened_in(io, BoardRole::watch);
   EXPECT_EQ(stopper->carrier->send(stop, Priority::stop), SendResult::sent);
   ASSERT_TRUE(run_until(io, [&] { return stopper->carrier->up(); }));
   EXPECT_EQ(device.sent, std::vector<std::string>{stop});
   EXPECT_TRUE(all_hear("SAFE:2;", stopper));
-  // A stop also works after the answer that there is no place.
+  // A stop also works after the holder has reported that there is no place.
   const auto late = opened_in(io, BoardRole::watch);
   ASSERT_TRUE(run_until(io, [&] { return late->heard.count(Kind::down) == 1; }));
   EXPECT_EQ(late->carrier->send(stop, Priority::stop), SendResult::sent);

@@ -80,7 +80,7 @@ TEST_F(SharedCarrier, ServesItsOwnProgramBeforeOthers) {
   send_message(watcher.get(), ShareMessage::Kind::hello, ShareMessage::version);
   std::array<char, ShareMessage::max_size> packet;
   const auto hear = [&] { return receive_packet(watcher.get(), packet.data(), packet.size()) > 0; };
-  for (int answers = 0; answers < 2;) {  // one for welcome, one for up
+  for (int answers = 0; answers < 2;) {  // one answer is welcome, the other is up
     run_for(io, 1ms);
     answers += hear() ? 1 : 0;
   }
@@ -112,7 +112,7 @@ TEST_F(SharedCarrier, EveryProgramHearsOtherHostsAndTooLongDatagrams) {
 
 TEST_F(SharedCarrier, AWatcherMayStopTheBoardAtOnceAndSendNothingElse) {
   const auto driver = opened(BoardRole::control);
-  const auto watcher = opened_in(io, BoardRole::watch);  // not served yet
+  const auto watcher = opened_in(io, BoardRole::watch);  // the holder does not serve it yet
   EXPECT_TRUE(watcher->carrier->is_shared());
   EXPECT_FALSE(driver->carrier->is_shared());
   EXPECT_EQ(watcher->carrier->send(datagram_of("H", "ROS2-R4"), Priority::normal),
@@ -159,7 +159,7 @@ TEST_F(SharedCarrier, WatchersYieldTheTransportToAControllingProgram) {
 TEST_F(SharedCarrier, AWatcherMayTakeAndReleaseControl) {
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
-  for (const auto* each : {two.get(), one.get()}) {  // as a served program, then as the holder
+  for (const auto* each : {two.get(), one.get()}) {  // first a served program, then the holder
     each->carrier->change_role(BoardRole::control);
     EXPECT_TRUE(error_of([&] { program(BoardRole::control, io)->open(); }))
         << "control changes at once";
@@ -196,7 +196,7 @@ TEST_F(SharedCarrier, AWatcherThatIsRefusedControlKeepsWatching) {
 TEST_F(SharedCarrier, ChangesItsRoleInAnyCallback) {
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
-  // the holder, then the program that it serves
+  // First the holder, then the program that it serves.
   for (Program* const each : {one.get(), two.get()}) {
     bool changed = false;
     const auto role = [&](BoardRole wanted) {
@@ -257,7 +257,7 @@ TEST_F(SharedCarrier, MayBeClosedInTheCallbackForAnOverheardStop) {
   EXPECT_EQ(device.sent, std::vector<std::string>{stop});
 }
 
-// When a board with a link to a pty restarts, the link leads to a new device.
+// When a board with a symbolic link to a pty restarts, the symbolic link leads to a new device.
 TEST_F(SharedCarrier, ReopensWhenADeviceNamedByItsPathIsUnplugged) {
   share.is_path = true;
   const auto one = opened(BoardRole::watch);
@@ -292,7 +292,7 @@ TEST_F(SharedCarrier, NamesASilentHolderIfTheTransportCannotBeOpened) {
     });
   };
   ASSERT_TRUE(goes_on());
-  // The holder stops again after it served the watcher.
+  // The holder stops again after it has served the watcher.
   ASSERT_TRUE(run_until(io, [&] { return watcher->heard.count(Kind::down) == 2; }));
   ASSERT_TRUE(goes_on());
   EXPECT_EQ(watcher->heard.count(Kind::down), 2U);

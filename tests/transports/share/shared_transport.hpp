@@ -24,8 +24,8 @@
 
 namespace r4::test {
 
-// A device that only one program can open at a time, such as a serial port, or that several
-// programs can open.
+// A device that only one program can open at a time, such as a serial port, or a device that
+// several programs can open.
 struct Device {
   class Port;
   bool exclusive = true;
@@ -33,7 +33,7 @@ struct Device {
   Port* open = nullptr;       // the newest port, if several programs have the device open
   int opened = 0;
   std::vector<std::string> sent;
-  std::function<void()> then_sent;  // also called
+  std::function<void()> then_sent;  // called after a datagram is sent
 
   void deliver(const std::string& datagram);
   void overhear(const std::string& datagram);
@@ -142,7 +142,7 @@ class SharedTransportTest : public testing::Test {
         role);
     return made;
   }
-  // A program whose open() has returned, in this loop or in a loop that does not run.
+  // A program whose open() has returned. Its loop need not run.
   std::unique_ptr<Program> opened_in(asio::io_context& loop, BoardRole role) {
     auto made = program(role, loop);
     made->open();
@@ -153,7 +153,7 @@ class SharedTransportTest : public testing::Test {
     EXPECT_TRUE(run_until(io, [&] { return made->carrier->up(); }));
     return made;
   }
-  // Waits for `done()`, even if this loop has nothing to wait for.
+  // Waits for `done()`, even if this loop waits for nothing.
   template <class Done>
   [[nodiscard]] bool in_time(Done done) {
     const auto deadline = Clock::now() + patience;
@@ -173,7 +173,7 @@ class SharedTransportTest : public testing::Test {
     });
   }
   // A socket of another user's program, which only root can make. With `has_name` it has the name
-  // of the holder with the given role; otherwise it is connected to that holder.
+  // of the holder with the given role. Otherwise it is connected to this holder.
   FileDescriptor foreign_socket(BoardRole role, bool has_name) const {
     const std::string name =
         (role == BoardRole::control ? "r4link/0/control/" : "r4link/0/") + share.text;

@@ -30,7 +30,6 @@ std::string port_of(const Carrier& board) {
 // A board answers only valid datagrams.
 std::string valid(std::string_view name) { return with_crc(std::string(name) + ":;"); }
 
-// The socket of another program.
 class Socket {
  public:
   Socket(asio::io_context& io, const char* address, unsigned short port = 0)
@@ -255,7 +254,7 @@ TEST_F(UdpCarrierTest, SendsStatesToTheControllingHostNotToTheHostHeardLast) {
   EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "another state"; }));
   EXPECT_EQ(stranger.receive(), "");
 
-  board_end_of(*board).hold(everyone);  // the host no longer has control
+  board_end_of(*board).hold(everyone);  // the host loses control
   stranger.send(valid("again"), port_of(*board));
   ASSERT_TRUE(wait_for(at_board, valid("again")));
   board->send("for anybody", Priority::state);
@@ -373,7 +372,7 @@ TEST_F(UdpCarrierTest, LeaksNoDescriptorsOver30Reopenings) {
   EXPECT_LE(open_descriptors(), before);
 }
 
-// Two boards of one program, which receives from both at one port.
+// Two boards of one program, which receives from both boards at one port.
 class UdpTwoBoardsTest : public testing::Test {
  protected:
   struct Link {
@@ -381,7 +380,7 @@ class UdpTwoBoardsTest : public testing::Test {
     std::unique_ptr<Carrier> board, host;
   };
 
-  // The system gives ports from 32768 on to other tests, also while this port is closed.
+  // The system assigns ports from 32768 on to other tests, even while this port is closed.
   UdpTwoBoardsTest() { listen = std::to_string(20000 + ::getpid() % 10000); }
 
   void open_board(Link& link, const std::string& address) {
@@ -392,7 +391,7 @@ class UdpTwoBoardsTest : public testing::Test {
   }
   std::string url(const Link& link) const { return link.board->name() + "?listen=" + listen; }
   void open_host(Link& link) { link.host = open_carrier(io, url(link), Role::host, link.at_host); }
-  // Both hosts send `count` questions at once. Each host receives the answers to its questions.
+  // Both hosts send `count` questions at once. Each host receives the answers to its own questions.
   void talk(const std::string& name, int count) {
     const std::size_t before[] = {links[0].at_host.datagrams.size(),
                                   links[1].at_host.datagrams.size()};
@@ -448,7 +447,7 @@ TEST_F(UdpTwoBoardsTest, AreDistinguishedByTheirPortAtOneAddress) {
     open_host(links[first]);
     open_host(links[1 - first]);
     talk("order", 50);
-    // A datagram of a third board at that address is for neither host.
+    // A datagram of a third board at this address is for neither host.
     Socket third(io, "127.0.0.1");
     const std::uint64_t foreign = links[first].host->counters().rx_foreign;
     third.send("of a third", listen);
@@ -477,7 +476,7 @@ TEST_F(UdpTwoBoardsTest, OneMayCloseAndReopen) {
   }
 }
 
-// A datagram of the second board that arrives before its host is open does not go to the first
+// A datagram of the second board that arrives before its host is open is not delivered to the first
 // host.
 TEST_F(UdpTwoBoardsTest, EarlyDatagramsOfTheSecondDoNotReachTheFirst) {
   for (Link& link : links) open_board(link, "127.0.0.1");
@@ -524,7 +523,8 @@ TEST_F(UdpTwoBoardsTest, KeepThePortFromOtherPrograms) {
   EXPECT_FALSE(tries_to_share("0.0.0.0"));
 }
 
-// The system reports to a connected socket that its board is off. This must not cost a datagram.
+// The system reports to a connected socket that its board is off. The report must not cost a
+// datagram.
 TEST_F(UdpTwoBoardsTest, TheFirstLosesNothingIfTheSecondIsOff) {
   open_board(links[0], "127.0.0.1");
   open_host(links[0]);

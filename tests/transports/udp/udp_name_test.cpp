@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board with a host name: how a UDP carrier looks up its address, and looks it up again.
+// A board with a host name: how a UDP carrier looks up its address, and repeats the lookup.
 #include <gtest/gtest.h>
 
 #include <asio/post.hpp>
@@ -16,7 +16,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A name server for the test. A thread that asks it may outlive the test.
+// A name server for the test. The thread of a lookup may outlive the test.
 class Names {
  public:
   // Sets the address of the host; "" if it has none.
@@ -29,7 +29,7 @@ class Names {
       shared_->found.addresses = {asio::ip::make_address(address)};
     }
   }
-  // While `on`, questions get no answer.
+  // While `on`, lookups get no answer.
   void hang(bool on) {
     const std::lock_guard lock(shared_->mutex);
     shared_->hangs = on;
@@ -75,7 +75,6 @@ class UdpNameTest : public testing::Test {
     const Url url = Url::parse("udp://board.test:" + port + "?listen=0");
     return make_udp_carrier_with(io, url, Role::host, lookup);
   }
-  // Opens the host in a handler of the loop.
   void open_in_loop() {
     host = make();
     asio::post(io, [this] { host->open(at_host); });

@@ -17,7 +17,6 @@ namespace {
 
 using Kind = ScriptStep::Kind;
 
-// The error for `text`, as a user sees it.
 std::string error_of(const std::string& text) {
   try {
     Script::parse(text, "bench.txt");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The simulated board on a pair of memory carriers, with a clock that the test moves.
+// The simulated board on a pair of memory carriers, with a clock that the test advances.
 #include "firmware/ports/sim/simulated_board.hpp"
 
 #include <gtest/gtest.h>
@@ -23,14 +23,12 @@ namespace {
 
 using firmware::BoardState;
 
-// The datagrams that arrive at the host's end.
 struct BoardListener final : Carrier::Handler {
   std::vector<std::string> heard;
   void on_datagram(std::string_view bytes, Peer) override { heard.emplace_back(bytes); }
   void on_carrier_event(const CarrierEvent&) override {}
 };
 
-// A board, a host at the other end of a pair of memory carriers, and the time.
 class SimulatedBoardTest : public testing::Test {
  protected:
   void build(SimulatedBoard::Options options = {}) {
@@ -82,7 +80,7 @@ class SimulatedBoardTest : public testing::Test {
     }
   }
 
-  // Runs the board with a host that answers at 10 Hz.
+  // Runs the board with a host that sends heartbeats at 10 Hz.
   void run_alive(std::uint32_t ms) {
     for (std::uint32_t done = 0; done < ms; done += 100) {
       heartbeat(newest_t());
@@ -109,11 +107,9 @@ class SimulatedBoardTest : public testing::Test {
     listener_.heard.clear();
   }
 
-  // E:CLEAR with the newest cause.
   std::string clear_field() const {
     return "E:CLEAR," + std::to_string(board_->application().safe_report().cause);
   }
-  // The T of the board's newest heartbeat.
   std::uint32_t newest_t() const {
     for (auto line = listener_.heard.rbegin(); line != listener_.heard.rend(); ++line) {
       Datagram datagram;
@@ -165,7 +161,7 @@ bool driven(const Pca9685Model& chip, int channel) {
   return !off(chip, channel) && chip.duty(channel) != 0;
 }
 
-constexpr std::uint8_t brakes_on = 0b10101010;  // by the plan
+constexpr std::uint8_t brakes_on = 0b10101010;  // according to the wiring plan
 
 // The first register that does not have its safe value, or an empty text.
 std::string unsafe_register(BoardChips& chips) {
@@ -401,7 +397,6 @@ TEST_F(SimulatedBoardTest, GoesSafeAtOnceWhenTheHostsCarrierCloses) {
   EXPECT_EQ(events_, (Lines{"down", "outputs 0", "SAFE link"}));
   EXPECT_TRUE(board_->model().pins().is_safe());
 
-  // The board is active as soon as the host reconnects.
   events_.clear();
   listener_.heard.clear();
   host_->open(listener_);
@@ -484,7 +479,7 @@ TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndIsReportedBack) {
       [this] {
         newest_t();
         listener_.heard.clear();
-        for (;;) {  // with all fields a state comes in parts; this part has all of them
+        for (;;) {  // a state with all fields comes in parts
           heartbeat(newest_t());
           run(10);
           State whole;
@@ -505,7 +500,6 @@ TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndIsReportedBack) {
 
 // --- trouble with the chips and the loop
 
-// A board whose host drives motor 1, with a script of trouble.
 class TroubledBoardTest : public SimulatedBoardTest {
  protected:
   void drive(const std::string& script) {
@@ -531,13 +525,12 @@ TEST_F(TroubledBoardTest, ASilentChipIsAFaultUntilItAnswersAndIsCleared) {
   EXPECT_EQ(events_, (Lines{"no acknowledge", "outputs 0", "SAFE fault"}));
   EXPECT_TRUE(board_->model().pins().is_safe());
   heartbeat(newest_t());
-  command(clear_field());  // executed, and the fault is still there
+  command(clear_field());  // executed, but the fault persists
   EXPECT_EQ(board_->application().reason(), SafeReason::fault);
   events_.clear();
   command("O:400,1,1");
   EXPECT_EQ(events_, Lines{"refused SAFE"});
   run_alive(2000);
-  // A fault stays until it is cleared.
   EXPECT_EQ(board_->application().reason(), SafeReason::fault);
   expect_drives_after_clear();
 }
@@ -565,7 +558,7 @@ TEST_F(TroubledBoardTest, AHungLoopGoesSafeBeforeTheWatchdogResetsIt) {
   }
   EXPECT_GE(off_ms, 99U);
   EXPECT_LE(off_ms, 101U);
-  EXPECT_EQ(events_, Lines{"outputs 0"});  // the application does not know yet
+  EXPECT_EQ(events_, Lines{"outputs 0"});  // before the application notices the fault
   while (board_->now_ms() - hung < 320) run(1);
   EXPECT_EQ(events_.back(), "SAFE watchdog");
   heartbeat(newest_t());

@@ -131,7 +131,7 @@ TEST(SimulatedHardware, TheHandlesVoltageFollowsTheHandle) {
   EXPECT_FALSE(bench.sample().handle_held());
   EXPECT_LT(bench.volts(Analog::aindmh), 10);
   bench.board.hold_handle(true);
-  EXPECT_FALSE(bench.sample().handle_held());  // the button may still bounce
+  EXPECT_FALSE(bench.sample().handle_held());  // the button may bounce
   bench.run(30);
   EXPECT_TRUE(bench.sample().handle_held());
   EXPECT_GT(bench.volts(Analog::aindmh), 1100);
@@ -204,16 +204,16 @@ TEST(SimulatedHardware, NoMotorTurnsWithoutSupply) {
   EXPECT_EQ(bench.board.stepper_shaft(1), -1000);
   EXPECT_GT(bench.mean(Analog::ainsteer), straight + 100);
 
-  // The handle's button cuts the supply itself: no command switches the motors off here.
+  // The handle's button cuts the supply itself: here no command switches the motors off.
   bench.board.hold_handle(false);
-  bench.run(4000);  // until the motor has stopped
+  bench.run(4000);  // the motor has stopped by this time
   expect_that_all_stand();
 }
 
 TEST(SimulatedHardware, AMotorTurnsItsEncoderInProportionToItsDuty) {
   HardwareBench bench;
   bench.hardware.hal().apply(osmc(2, 2048, Direction::forward));
-  bench.run(2000);  // until the motor has its full speed
+  bench.run(2000);  // the motor has its full speed by this time
   const std::int32_t before = bench.sample().encoder_counts[1];
   bench.run(1000);
   EXPECT_NEAR(bench.sample().encoder_counts[1] - before, 2000, 5);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The firmware's hardware on boards with any wiring, which it knows, and on boards that are wired
-// otherwise than it believes.
+// The firmware's hardware on boards with any wiring that the firmware knows, and on boards whose
+// wiring differs from the firmware's.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -98,7 +98,7 @@ void expect_outputs(const WiredBoard& board, const Outputs& outputs) {
   }
 }
 
-// No motor is driven, no relay is closed, every brake that the board can reach is on.
+// No motor is driven, no relay is closed, and every brake that the board can reach is on.
 void expect_safe(const WiredBoard& board) {
   Outputs safe;
   expect_outputs(board, safe);

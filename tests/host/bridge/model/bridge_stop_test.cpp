@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How long an emergency stop takes through a bridge from UDP to a full CAN bus. A board sends
-// states as fast as the bus carries them, and the bridge passes on each of them. Meanwhile a host
+// states as fast as the bus carries them, and the bridge passes on each state. Meanwhile a host
 // sends commands.
 //
-// The bridge, its carriers, UDP and the loop are real. The bus is exact to the bit; its time stands
-// still while the bridge works.
+// The bridge, its carriers, UDP and the loop are real. The bus is exact to the bit. Its clock stops
+// while the bridge works.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -33,7 +33,7 @@ constexpr std::uint8_t number = 3;
 constexpr std::uint64_t ms_ns = 1000000;
 constexpr std::chrono::seconds patience{60};  // for a slow machine
 
-// Sends one state after the other, and counts the datagrams that it receives.
+// Sends one state after another, and counts the datagrams that it receives.
 class TalkingBoard {
  public:
   explicit TalkingBoard(CanBusModel& bus) : bus_(bus), node_(CanEnd::board, number, false) {
@@ -57,7 +57,7 @@ class TalkingBoard {
       node_.begin(Text(state()), bus_.now_us());
       ++said;
     }
-    // The frames of a transfer come one after the other.
+    // The frames of a transfer come one after another.
     CanFrame frame{};
     while (bus_.waiting(controller_) < 1 && node_.offer(bus_.now_us(), frame)) {
       bus_.send(controller_, frame);
@@ -102,13 +102,13 @@ class BridgeToAFullBus {
     const auto* const to = reinterpret_cast<const sockaddr*>(&to_);
     ::sendto(socket_.get(), bytes.data(), bytes.size(), 0, to, sizeof to_);
   }
-  // The bridge does all pending work; the time of the bus stands still.
+  // The bridge does all pending work while the clock of the bus is stopped.
   void settle() {
     pair->tick();
     do controller.pump();
     while (io.poll() != 0);
   }
-  // The bus runs until then_ns. The bridge reacts to each event at the time of that event.
+  // The bus runs until then_ns. The bridge reacts to each event at the time of the event.
   void run_until(std::uint64_t then_ns) {
     while (bus.next_ns() <= then_ns) {
       bus.run_until(bus.next_ns());
@@ -145,14 +145,13 @@ bool is_bare_stop(const CanFrame& frame) {
   return !frame.extended && frame.id == emergency_stop_id;
 }
 
-// The stop comes after the frame in progress and at most `frames_between` other frames of the
-// bridge.
+// The stop follows the frame in progress and at most `frames_between` other frames of the bridge.
 void expect_stops(const ControllerOptions& options, std::uint64_t frames_between) {
   constexpr std::uint64_t stops = 400;
   BridgeToAFullBus world(options);
   ASSERT_TRUE(world.comes([&] {
     world.say("H:ROS2-R4");
-    return world.board.told != 0;  // a host is heard, so the bridge listens on the bus
+    return world.board.told != 0;  // the bridge serves a host, so it listens on the bus
   }));
   simulation::Random random(2);
   std::uint64_t max_ns = 0;
@@ -165,7 +164,8 @@ void expect_stops(const ControllerOptions& options, std::uint64_t frames_between
   for (std::uint64_t i = 0; i < stops; ++i) {
     world.say("H:ROS2-R4");
     world.say("S:1500,1");
-    // Half of the stops come at any time, half while more frames wait than the controller takes.
+    // Half of the stops come at any time, the other half while more frames wait than the controller
+    // accepts.
     const bool at_any_time = i % 2 == 0;
     for (int frames = 0; frames < 100 && !at_any_time; ++frames) {
       if (world.controller.waiting() >= options.room) break;
@@ -213,7 +213,7 @@ void expect_stops(const ControllerOptions& options, std::uint64_t frames_between
   EXPECT_GT(full, stops / 4) << "the controller was rarely full";
   EXPECT_GT(static_cast<double>(world.bus.busy_ns()),
             0.99 * static_cast<double>(world.bus.now_ns()));
-  // Transfers may be given up while the machine stands still.
+  // Transfers may be cancelled during a standstill of the machine.
   EXPECT_GT(passed, said / 2);
   EXPECT_GT(said, (world.bus.now_ns() - began_ns) / (10 * ms_ns));
 }

@@ -28,7 +28,7 @@ bool put(int socket, const CanFrame& frame) {
   return ::send(socket, &frame, sizeof frame, MSG_DONTWAIT | MSG_NOSIGNAL) == sizeof frame;
 }
 
-// The end of the program and the end of the kernel, with the smallest possible buffer between them.
+// The program's end and the kernel's end, with the smallest possible buffer between them.
 std::pair<FileDescriptor, FileDescriptor> make_socket() {
   std::array<int, 2> ends{};
   const int least = 1;

@@ -4,7 +4,7 @@
 //
 //     a socket for urgent frames, a socket for the other frames --> the controller --> the bus
 //
-// As in the kernel, a socket takes no more frames than its small buffer holds, and urgent frames
+// As in the kernel, a socket accepts no more frames than its small buffer holds, and urgent frames
 // reach the controller first.
 #pragma once
 
@@ -29,7 +29,8 @@ class ModelledController {
   ModelledController(const ModelledController&) = delete;
   ModelledController& operator=(const ModelledController&) = delete;
 
-  // A program has opened the interface. The parameters are the kernel's ends of its sockets.
+  // Connects a program that has opened the interface. The parameters are the kernel's ends of its
+  // sockets.
   void connect(FileDescriptor first, FileDescriptor rest);
   // Moves frames from the sockets to the controller while the controller has room.
   void pump();

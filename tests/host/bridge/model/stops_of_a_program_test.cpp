@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the stops of a program reach a CAN bus: which stops are merged into one, and how each is
+// How the stops of a program reach a CAN bus: which stops are merged into one, and how each stop is
 // confirmed. The carriers and the loop are real, and the bus is exact to the bit.
 #include <gtest/gtest.h>
 
@@ -63,7 +63,8 @@ class ProgramOnABus : public testing::Test, private Carrier::Handler {
     }
     return stops;
   }
-  // The board reports that it has obeyed the last stop. Returns the datagrams that its host hears.
+  // The board reports that it has obeyed the last stop. Returns the datagrams that its host
+  // receives.
   Texts confirmed_by(std::uint8_t board) {
     const std::string says = heartbeat(number_);
     CanNode node(CanEnd::board, board, false);

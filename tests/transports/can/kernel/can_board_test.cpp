@@ -13,19 +13,19 @@
 namespace r4::test {
 namespace {
 
-// In the packed form. Every channel in plain text is tested over UDP and a pty
-// (tests/host/board_test.cpp).
+// In the packed form. tests/host/board_test.cpp tests every channel in plain text over UDP and a
+// pty.
 TEST(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated("can://vcan0?node=9");
   Board board(simulated.url(), at_will());
   board.wait_active();
-  board.setting("rate", "50");  // an emulated computer is too slow for 100
+  board.setting("rate", "50");  // an emulated machine is too slow for 100
   expect_every_channel(controlled(simulated, board));
   EXPECT_NE(board.carrier_counters().transfers->packed, 0U);
 }
 
-// An emulated computer takes longer for a datagram than a real one, and the reported error includes
-// that.
+// An emulated machine takes longer for a datagram than a real machine. The reported error includes
+// this time.
 TEST(CanSampledTime, IsAlwaysWithinItsErrorBound) {
   using namespace std::chrono_literals;
   BoardInAThread simulated("can://vcan0?node=9");

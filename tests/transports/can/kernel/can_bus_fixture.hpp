@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CanBus on a separate vxcan pair. For the CanBus, frames from the far end come from another
-// computer, and frames that are sent at the near end are local. For tools/with-can.
+// A CanBus on a separate vxcan pair. The CanBus treats frames from the far end as frames of another
+// machine, and frames sent at the near end as local. For tools/with-can.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -12,7 +12,7 @@
 namespace r4::test {
 namespace {
 
-// Offers a number of frames, and records whether each was sent, was late or was dropped.
+// Offers a number of frames, and records whether each frame was sent, late or dropped.
 class Talker final : public CanBus::Member {
  public:
   Talker(std::shared_ptr<CanBus> bus, int frames) : left_(frames), bus_(std::move(bus)) {
@@ -83,7 +83,7 @@ struct Link {
   std::unique_ptr<Carrier> host, board;
 };
 
-constexpr int most_runs = 20;  // attempts, because this computer may stand still during a run
+constexpr int most_runs = 20;  // attempts, because this machine may have a standstill during a run
 
 class CanBusLoad : public CanBusTest {};
 
@@ -115,7 +115,7 @@ TEST_F(CanBusLoad, ADelayedFirstFrameStillHasItsFullAnswerTime) {
   for (int run = 0; run < most_runs && !in_time; ++run) {
     std::vector<std::unique_ptr<Link>> links;
     while (links.size() < hosts) links.push_back(std::make_unique<Link>(io, links.size()));
-    run_for(soon);  // a host listens before it sends
+    run_for(soon);  // a host receives before it sends
     for (const auto& link : links) {
       ASSERT_EQ(link->host->send(in_two_frames, Priority::normal), SendResult::sent);
     }
@@ -147,7 +147,7 @@ TEST_F(CanBusLoad, AnUnansweredFirstFrameTimesOutOnAFullBus) {
   EXPECT_LT(talker.accepted, 200);
 }
 
-// A board that always has a state to send must still detect that an answer is missing.
+// A board that always has a state to send must detect that an answer is missing.
 TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutNextToALongState) {
   Recorder told;
   const auto board = make_can_carrier(io, Link::url(near_end, node), Role::board);
@@ -236,7 +236,6 @@ class CanBusTimes : public CanBusTest {
       sendings.push_back({before_us, CanBus::now_us()});
     }
   }
-  // The shortest and the longest possible time between frames n-1 and n.
   std::uint32_t least_gap_us(std::size_t n) const {
     return sendings[n].before_us - sendings[n - 1].after_us;
   }
@@ -268,7 +267,7 @@ TEST_F(CanBusTimes, AreTheArrivalTimesOfFramesThatAreReadLate) {
     read_all();
     send(frames.size() - 1, gap);
     read_all();
-    in_time = true;  // false if this computer stood still
+    in_time = true;  // false after a standstill of this machine
     for (std::size_t n = 1; n < frames.size(); ++n) {
       if (most_gap_us(n) > n_cr / std::chrono::microseconds(1)) in_time = false;
     }
@@ -301,7 +300,7 @@ class CanBusOverflow : public CanBusTest {
     std::ifstream("/sys/class/net/vxcan7/statistics/rx_packets") >> count;
     return count;
   }
-  // Returns when all frames in the socket were read. A frame reports how many frames were lost
+  // Returns when all frames in the socket are read. A frame reports how many frames were lost
   // before it.
   void flood() {
     const std::size_t before = member.frames.size();

@@ -197,7 +197,7 @@ TEST_F(CanBusTest, IsDownUntilTheKernelAcceptsItsFilters) {
   EXPECT_EQ(member.events.back().first, Kind::down);
   EXPECT_EQ(member.events.back().second.find("the kernel does not take the filters"), 0U);
   EXPECT_NE(member.fix.find("fewer nodes"), std::string::npos);
-  run_for(soon);  // the bus tries again meanwhile
+  run_for(soon);  // during this time the bus tries again
   EXPECT_FALSE(bus->up());
   EXPECT_EQ(member.events.size(), 1U);
   greedy.leave();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A fleet on one CAN bus: one frame stops all its boards.
+// A fleet on one CAN bus: one frame stops all boards of the fleet.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 namespace r4::test {
 namespace {
 
-// A board refuses a late command, so on a busy computer the test sends it again.
+// A board refuses a late command, so on a busy machine the test repeats the command.
 void send_to_all(Fleet& fleet, const std::string& command) {
   for (int most = 20; most > 0; --most) {
     if (fleet.send(command, std::chrono::seconds{5}).all_confirmed()) return;
@@ -37,7 +37,7 @@ TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
 
   RawCan bare(emergency_stop_id);
   EXPECT_TRUE(fleet.stop(std::chrono::seconds{5}).all_confirmed());
-  std::uint32_t quiet_us = clock_us() + 300000;  // longer than a stop is repeated, 200 ms
+  std::uint32_t quiet_us = clock_us() + 300000;  // a stop is repeated for 200 ms
   int frames = 0;
   CanFrame frame;
   while (bare.receive(frame, quiet_us)) ++frames;

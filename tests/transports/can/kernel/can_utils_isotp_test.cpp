@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The tools isotpsend and isotprecv of can-utils with our ISO-TP engine. For tools/with-can. Both
-// tools use the ISO-TP sockets of the kernel; kernel_isotp_test.cpp tests every length.
+// tools use the ISO-TP sockets of the kernel. kernel_isotp_test.cpp tests every length.
 #include <gtest/gtest.h>
 #include <stdio.h>
 
@@ -33,7 +33,7 @@ class Program {
     for (int byte; (byte = fgetc(output_)) != EOF;) text += static_cast<char>(byte);
     return text;
   }
-  // Waits for the end of the command; returns its exit status.
+  // Waits for the end of the command. Returns its exit status.
   int end() { return output_ == nullptr ? -1 : pclose(std::exchange(output_, nullptr)); }
 
  private:
@@ -67,14 +67,14 @@ TEST_P(CanUtils, IsotprecvPrintsDatagramsOfTheEngine) {
   options.n_bs_us = 100000;
   IsotpSender sender(options);
   for (const std::uint32_t size : sizes) {
-    // a single frame does not show whether a program listens
+    // A single frame does not show whether a program receives.
     if (size < GetParam().tx_dl - 1U) continue;
     const std::string datagram = content_of(size);
     Program program("timeout 10 isotprecv -s 200 -d 180 -b 8 -P l" + link_options(GetParam()));
     const std::uint32_t until_us = clock_us() + 5000000;
     while (drive(bus, sender, datagram).error == IsotpError::flow_control_timeout &&
            !reached(clock_us(), until_us)) {
-      // isotprecv has not bound its socket yet
+      // The program isotprecv has not bound its socket yet.
     }
     EXPECT_EQ(sender.error(), IsotpError::none);
     EXPECT_EQ(program.output(), hex_of(datagram) + "\n");

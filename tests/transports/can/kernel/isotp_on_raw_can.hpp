@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives our engine frame by frame over a raw socket, as a carrier does, until the end of one
+// Runs our engine frame by frame over a raw socket, as a carrier does, until the end of one
 // transfer.
 #pragma once
 
@@ -18,13 +18,13 @@ namespace r4::test {
 
 constexpr std::uint32_t data_id = 0x180;
 constexpr std::uint32_t flow_control_id = 0x200;
-// The emulated computer is slow and shares its processors, so limits that are not under test are
+// The emulated machine is slow and shares its processors, so limits that are not under test are
 // long.
 constexpr std::uint32_t patience_us = 2000000;
-// from the call to the first frame, which may come from another program
+// From the call to the first frame, which may come from another program.
 constexpr std::uint32_t start_limit_us = 10000000;
 
-// The lengths to test: each length at which single frames end or sequence numbers restart. Then
+// The lengths to test: each length at which single frames end or sequence numbers restart. Also
 // every 17th length, so that last frames of all sizes occur, and lengths that need a 32-bit first
 // frame. Isotp.EveryLengthInEveryFrameLengthArrives tests all lengths, without a bus.
 constexpr std::uint32_t next_length(std::uint32_t size) {
@@ -78,7 +78,7 @@ inline KernelIsotpOptions kernel_of(const Form& form) {
   return options;
 }
 
-// Two lengths never have the same content.
+// Two different lengths have different contents.
 inline std::string content_of(std::uint32_t size) {
   std::mt19937 random(size);
   std::string bytes(size, '\0');
@@ -129,7 +129,7 @@ inline Course drive(RawCan& bus, IsotpSender& sender, const std::string& datagra
   return course;
 }
 
-// Runs until a transfer ends, with or without an error; n_cr and other limits are options of the
+// Runs until a transfer ends, with or without an error. N_Cr and other limits are options of the
 // receiver. If no transfer begins within start_limit_us, the course has no frames.
 inline Course drive(RawCan& bus, IsotpReceiver& receiver, const Lost& lost = none_lost) {
   Course course;

@@ -20,7 +20,7 @@ struct KernelIsotpOptions {
   std::uint8_t rx_padding = 0xCC;
   std::uint8_t block_size = 0;
   std::uint8_t stmin = 0;
-  // otherwise each frame waits for a timer
+  // Without this value, each frame waits for a timer.
   std::uint32_t frame_txtime_ns = CAN_ISOTP_FRAME_TXTIME_ZERO;
 };
 
@@ -46,13 +46,13 @@ class KernelIsotp : CanSocket {
     bind_to_interface(address);
   }
 
-  // Returns when the first frame is on the bus. Waits first until the last transfer has ended.
+  // Waits until the last transfer has ended. Returns when the first frame is on the bus.
   void send(const std::string& datagram) {
     const ssize_t size = write(fd(), datagram.data(), datagram.size());
     if (size != static_cast<ssize_t>(datagram.size())) fail("CAN_ISOTP send");
   }
 
-  // The next datagram; none if it does not arrive within the limit, or after an error.
+  // The next datagram. None if it does not arrive within the limit, or after an error.
   std::optional<std::string> receive(std::uint32_t limit_us = 2000000) {
     std::string datagram(65536, '\0');
     const std::uint32_t until_us = clock_us() + limit_us;
@@ -68,14 +68,14 @@ class KernelIsotp : CanSocket {
     return datagram;
   }
 
-  // Waits for the next datagram without a limit; returns its size, cut to `size`.
+  // Waits for the next datagram without a limit. Returns its size, at most `size`.
   std::size_t await_datagram(void* data, std::size_t size) {
     const ssize_t got = recv(fd(), data, size, 0);
     if (got < 0) fail("CAN_ISOTP receive");
     return static_cast<std::size_t>(got);
   }
 
-  // The errno since the last call; 0: none. Waits for an error up to `limit_us`.
+  // The errno since the last call. 0: no error. Waits for an error up to `limit_us`.
   int error(std::uint32_t limit_us = 0) {
     int error = std::exchange(error_, 0);
     if (error == 0 && limit_us != 0) await(fd(), 0, clock_us() + limit_us);

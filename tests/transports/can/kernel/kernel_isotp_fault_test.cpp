@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Our ISO-TP engine and the kernel's on one bus, with faults. For tools/with-can.
+// Our ISO-TP engine and the kernel's engine on one bus, with faults. For tools/with-can.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::uint32_t capacity = 1024;
 
-// The time-outs under test, and how late a slow computer may detect them.
+// The timeouts under test, and how late a slow machine may detect them.
 constexpr std::uint32_t time_out_us = 200000;
 constexpr std::uint32_t lateness_us = 1000000;
 
@@ -68,7 +68,7 @@ class Peer {
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
 
-  // On return the process and its socket no longer exist.
+  // On return the process and its socket have ended.
   void kill_now() {
     if (process_ <= 0) return;
     kill(process_, SIGKILL);
@@ -90,8 +90,8 @@ TEST(KernelIsotpFaults, KernelReportsMissingPadding) {
 }
 
 // For each lost frame: no damaged datagram is delivered, and the next transfer succeeds. The last
-// frame of the damaged datagram is full, because both engines ignore a short frame that is not the
-// last one.
+// frame of the damaged datagram is full, because both engines ignore a short frame before the last
+// frame.
 constexpr std::uint32_t damaged_size = 174;
 constexpr unsigned last_frame = 24;
 
@@ -191,8 +191,8 @@ TEST(KernelIsotpFaults, EngineEndsWithN_BsWhenTheKernelsProcessIsKilledInTheMidd
   EXPECT_TRUE(restarted.receive() == content_of(1000));
 }
 
-// The kernel finishes the transfer of a killed process. So this process runs our sender, which
-// cannot finish.
+// The kernel finishes the transfer of a killed process. So the killed process runs our sender,
+// which cannot finish.
 TEST(KernelIsotpFaults, EngineEndsWithN_CrWhenTheSendersProcessIsKilledInTheMiddle) {
   RawCan bus(data_id);
   Peer peer([](const std::function<void()>& ready) {

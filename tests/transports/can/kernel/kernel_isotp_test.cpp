@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Our ISO-TP engine and the kernel's on one bus, without faults. For tools/with-can.
+// Our ISO-TP engine and the kernel's engine on one bus, without faults. For tools/with-can.
 #include "tests/transports/can/kernel/kernel_isotp.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,6 @@ unsigned faults(const IsotpReceiverCounters& counters) {
          counters.unexpected_frame + counters.malformed;
 }
 
-// Our engine sends; the kernel's socket receives.
 struct EngineToKernel {
   explicit EngineToKernel(const Form& form) : EngineToKernel(sender_of(form), kernel_of(form)) {}
   EngineToKernel(const IsotpSenderOptions& options, const KernelIsotpOptions& peer)
@@ -32,7 +31,6 @@ struct EngineToKernel {
   IsotpSender sender;
 };
 
-// The kernel's socket sends; our engine receives.
 struct KernelToEngine {
   explicit KernelToEngine(const Form& form) : KernelToEngine(kernel_of(form), receiver_of(form)) {}
   KernelToEngine(const KernelIsotpOptions& peer, const IsotpReceiverOptions& options)
@@ -125,7 +123,7 @@ TEST_P(KernelIsotpForms, BroadcastsToTheListeningEngine) {
 
 TEST(KernelIsotp, AgreesWithTheEngineOnEveryFrameSizeOfFd) {
   constexpr std::uint8_t frame_sizes[] = {12, 16, 20, 24, 32, 48};
-  // three frames of the longest size, and more frames of each shorter size
+  // Three frames of the longest size, and more frames of each shorter size.
   constexpr std::uint32_t longest = 150;
   for (const std::uint8_t tx_dl : frame_sizes) {
     const Form form{"", tx_dl, false};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CAN_RAW socket for tests: it receives one id, and every wait has a limit. If the kernel refuses
-// a call, the class throws the reason, so that the test fails with it.
+// A CAN_RAW socket for tests. It receives one id, and every wait has a limit. If the kernel refuses
+// a call, the class throws the reason, so the test fails with the reason.
 #pragma once
 
 #include <linux/can.h>
@@ -24,7 +24,7 @@ namespace r4::test {
 
 constexpr char can_interface[] = "vcan0";
 
-// Microseconds of a monotonic clock; wraps.
+// Microseconds of a monotonic clock. The value wraps.
 inline std::uint32_t clock_us() {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
@@ -41,7 +41,7 @@ inline bool await(int fd, short events, std::uint32_t until_us) {
   return ppoll(&wait, 1, &limit, nullptr) == 1;
 }
 
-// A socket of PF_CAN; the derived class binds it to the interface.
+// A socket of PF_CAN. The derived class binds it to the interface.
 class CanSocket {
  public:
   CanSocket(const CanSocket&) = delete;
@@ -84,7 +84,7 @@ class RawCan : CanSocket {
     bind_to_interface({}, interface);
   }
 
-  // If the queue is full (ENOBUFS), the frame is offered again until the kernel accepts it.
+  // If the queue is full (ENOBUFS), the frame is offered until the kernel accepts it.
   void send(const CanFrame& frame, std::uint32_t limit_us = 1000000) {
     canfd_frame raw{};
     raw.can_id = frame.id;
@@ -98,7 +98,7 @@ class RawCan : CanSocket {
     }
   }
 
-  // The next frame, if it arrives before the given time.
+  // Receives the next frame. False if no frame arrives before the given time.
   bool receive(CanFrame& frame, std::uint32_t until_us) {
     canfd_frame raw;
     ssize_t size;

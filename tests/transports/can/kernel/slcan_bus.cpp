@@ -4,37 +4,38 @@
 //     slcan_bus [--nodes 2] [--bitrate 125000]
 //
 // It opens a pty for each node and prints one line:
-// {"type":"ready","bitrate":125000,"ptys":["/dev/pts/3",…]}. Each pty speaks the slcan protocol, as
+// {"type":"ready","bitrate":125000,"ptys":["/dev/pts/3",…]}. Each pty uses the slcan protocol, as
 // the adapters of line discipline 17 of Linux do:
 //
 //     fd = os.open(pty, os.O_RDWR | os.O_NOCTTY); fcntl.ioctl(fd, termios.TIOCSETD, 17 as an int)
 //     ip link set slcan0 type can bitrate 125000 && ip link set slcan0 up
 //
-// (or slcan_attach). The process keeps the ptys open, so the interfaces exist until it ends. The
-// kernel sends C, S and O when an interface of known bit rate comes up. A wrong bit rate is
-// refused, and that node stays off the bus. O resets the controller: no errors, an empty queue, and
-// a return from bus-off after 128 times 11 recessive bits. The controller has three mailboxes,
-// lowest id first. While they are full, the pty is not read, and frames wait in the kernel.
+// (or slcan_attach). The process keeps the ptys open, so the interfaces exist until the process
+// ends. The kernel sends C, S and O when an interface of known bit rate comes up. The process
+// refuses a wrong bit rate, and then the node stays off the bus. O resets the controller: no
+// errors, an empty queue, and a return from bus-off after 128 times 11 recessive bits. The
+// controller has three mailboxes, lowest id first. While they are full, the pty is not read, and
+// frames wait in the kernel.
 //
-// The bus (support/can_bus_model.hpp) follows the clock. If the process was delayed, it catches up:
+// The bus (support/can_bus_model.hpp) follows the clock. If the process is delayed, it catches up:
 // frames on the bus keep their correct times, whenever the process computes them.
 //
 // The process reports to the kernel what a hardware controller reports to its driver. It sends
 // s[awpb]RRRTTT when the state of a node changes (active, warning from 96 errors, passive, bus-off;
 // the counters). It sends e3aaa when a frame was not acknowledged, and e3ccc when a frame was
 // damaged, each at most every 10 ms. They have three letters because slcan ignores lines of less
-// than five characters. The kernel turns these lines into error frames. Linux 6.1 turns the carrier
-// off at bus-off. slcan turns it on again only after `ip link set slcan0 down` and `up` (no
-// restart-ms, no CAN_ERR_RESTARTED).
+// than five characters. The kernel turns these lines into error frames. Linux 6.1 switches the
+// carrier off at bus-off. slcan switches the carrier on again only after `ip link set slcan0 down`
+// and `up` (no restart-ms, no CAN_ERR_RESTARTED).
 //
-// Orders, one line each on stdin. The answer to each is one line, {"type":"done"} or
+// Orders, one line each on stdin. The answer to each order is one line, {"type":"done"} or
 // {"type":"error","reason":…}. The process ends at the end of stdin.
 //
 //     noise P            damages each frame with probability P, so that it is sent again
-//     spoil K | heal K   damages the frames of node K: it becomes passive, then bus-off | ends that
+//     spoil K | heal K   damages the frames of node K: passive, then bus-off | ends the damage
 //     errors K TEC REC   sets the counters of node K, and its state accordingly
 //     away K | back K    disconnects node K from the bus: it does not acknowledge | reconnects it
-//     babble ID | quiet  another node sends this id (hex) without a pause, 8 bytes | ends that
+//     babble ID | quiet  another node sends this id (hex) and 8 bytes without a pause | ends it
 //     stall K | go K     does not read the pty of node K, as if the controller were full | reads it
 //     status             the answer has the counters of each node
 //
@@ -143,7 +144,7 @@ class Bus {
   struct Adapter {
     int node = 0;
     int pty = -1;
-    int kept = -1;  // the far end, kept open so that the pty always has one
+    int kept = -1;  // the far end, kept open so that the pty always has a far end
     std::string name;
     std::string input;
     bool open = false;
@@ -270,7 +271,7 @@ void Bus::read(Adapter& adapter) {
   if (count > 0) adapter.input.append(bytes.data(), static_cast<std::size_t>(count));
 }
 
-// The kernel writes one frame and waits until it is read. Later bytes are a command; frames before
+// The kernel writes one frame and waits until it is read. Later bytes are a command. Frames before
 // a C are not sent.
 void Bus::read_if_closed(Adapter& adapter) {
   int unread = 0;

@@ -72,7 +72,7 @@ std::size_t classic_bits(const CanFrame& frame) {
   return stuffed(bits + crc15(bits)).size() + tail.size();
 }
 
-// The bits of an FD frame. The length of its CRC field does not depend on its value.
+// The bits of an FD frame. The length of its CRC field does not depend on the value of the CRC.
 std::size_t fd_bits(const CanFrame& frame, bool switches) {
   const int sizes[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
   std::uint32_t code = 0;
@@ -96,7 +96,7 @@ CanFrame any_frame() {
   frame.remote = !frame.fd && *rc::gen::inRange(0, 8) == 0;
   frame.id = *rc::gen::arbitrary<std::uint32_t>() & (frame.extended ? 0x1FFFFFFFU : max_can_id);
   frame.size = can_frame_size(static_cast<std::uint32_t>(*rc::gen::inRange(0, frame.fd ? 65 : 9)));
-  // Also long runs of equal bits, which need stuff bits.
+  // Includes long runs of equal bits, which need stuff bits.
   const std::vector<std::uint8_t> bytes = *rc::gen::elementOf(
       std::vector<std::vector<std::uint8_t>>{{0x00}, {0xFF}, {0x0F}, {0x3C, 0x1E}, {}});
   for (std::size_t i = 0; i < frame.size; ++i) {
@@ -106,9 +106,9 @@ CanFrame any_frame() {
 }
 
 TEST(CanBits, MatchThePublishedBitsOfAClassicFrame) {
-  // Tindell, Burns: "Guaranteeing message latencies on CAN"; Davis, Burns, Bril, Lukkien:
-  // "Controller Area Network (CAN) schedulability analysis", equations 1 and 2: 55 + 10 n bits with
-  // 11-bit ids, 80 + 10 n with 29-bit ids.
+  // 55 + 10 n bits with 11-bit ids, 80 + 10 n with 29-bit ids. Tindell, Burns: "Guaranteeing
+  // message latencies on CAN"; Davis, Burns, Bril, Lukkien: "Controller Area Network (CAN)
+  // schedulability analysis", equations 1 and 2.
   for (std::uint8_t size = 0; size <= 8; ++size) {
     EXPECT_EQ(total(least_can_bits(size, false, false)), 47U + 8U * size);
     EXPECT_EQ(total(worst_can_bits(size, false, false)), 55U + 10U * size);
@@ -121,15 +121,15 @@ TEST(CanBits, MatchThePublishedBitsOfAClassicFrame) {
 
 TEST(CanBits, MatchFramesCountedByHand) {
   CanFrame frame{};
-  // 34 zeros, because the CRC is also 0: a stuff bit after every five.
+  // 34 zeros, because the CRC is also 0. A stuff bit follows every five zeros.
   EXPECT_EQ(total(can_bits(frame)), 47U + 6U);
-  // SOF and id 0 are 12 zeros: stuff bits after 5 and 10 of them. The other 4 of the 14 bits before
-  // FDF follow.
+  // SOF and id 0 are 12 zeros. Stuff bits follow after 5 and 10 zeros. Then the other 4 of the 14
+  // bits before FDF follow.
   frame = test::frame_of(0, "");
   frame.fd = true;
   const CanBits bits = can_bits(frame);
   EXPECT_EQ(bits.nominal, 14U + 2U + 3U + 12U);
-  // ESI and length code are five zeros after a BRS of 1: the fixed stuff bit follows them anyway.
+  // ESI and length code are five zeros after a BRS of 1. The fixed stuff bit follows them anyway.
   EXPECT_EQ(bits.data, 5U + 27U + 1U);
 }
 
@@ -202,7 +202,8 @@ TEST(CanBits, GiveTheLongestTimeOfADatagram) {
   EXPECT_EQ(worst_ns(170, 64, one_and_five_mbit), 516200U) << "3 frames and a flow control";
 }
 
-// Design: an emergency stop waits for one frame on the bus and takes one frame time, within 270 us.
+// The design: an emergency stop waits for one frame on the bus and takes one frame time, within 270
+// us.
 TEST(CanBits, TwoFramesAreLessThan270Microseconds) {
   EXPECT_LE(2 * time_ns(worst_can_bits(8, false, false), at_one_mbit), 270000U);
 }

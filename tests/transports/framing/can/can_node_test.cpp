@@ -216,7 +216,7 @@ TEST(CanNode, ALostFrameCostsExactlyOneDatagram) {
   }
 }
 
-// The process of a host can be delayed for longer than a bus.
+// The process of a host can have longer delays than a bus.
 TEST(CanNode, AcceptsACommandWithFramesLessThan100MsLate) {
   for (const std::uint32_t late_us : {99999U, 100000U}) {
     CanNode board(CanEnd::board, 3, false);

@@ -19,8 +19,8 @@ namespace {
 constexpr std::uint32_t frame_us = 130;     // a classic frame at 1 Mbit/s
 constexpr std::uint32_t period_us = 10000;  // from one datagram to the next
 
-// The lengths of the datagrams in a stream: a random length between two limits, and regularly
-// another length.
+// The lengths of the datagrams in a stream: random between two limits, and at regular intervals a
+// different length.
 struct Stream {
   const char* what;
   std::uint32_t shortest, longest;
@@ -31,10 +31,10 @@ struct Stream {
 struct Count {
   int whole = 0;
   int joined = 0;
-  int told = 0;  // joined datagrams between whose frames the receiver heard a wrong sequence number
+  int told = 0;  // joined datagrams between whose frames the receiver got a wrong sequence number
 };
 
-// A board sends, and a listener hears each frame with a certain probability.
+// A board sends, and a listener receives each frame with a certain probability.
 class LossyLine {
  public:
   explicit LossyLine(double loss) : lost_(loss) {}
@@ -44,7 +44,7 @@ class LossyLine {
     for (int number = 0; number < stream.datagrams; ++number) {
       const bool other = stream.other_every != 0 && number % stream.other_every == 0;
       const std::uint32_t size = other ? stream.other : length(chance_);
-      // Each datagram is filled with one byte; the same byte returns after 251 datagrams.
+      // Each datagram is filled with one byte. The same byte returns after 251 datagrams.
       std::memset(bytes_.data(), number % 251, size);
       send(size, number % 251);
       now_us_ += period_us;
@@ -83,8 +83,8 @@ class LossyLine {
     }
   }
 
-  // True if the frames heard since the last first frame count up from it. Frames of an invalid
-  // length are ignored (9.6.4.1).
+  // True if the frames that arrived since the last first frame count up from it. Frames of an
+  // invalid length are ignored (9.6.4.1).
   bool note(const CanFrame& frame, bool passed_over) {
     if (frame.data[0] >> 4 != static_cast<int>(IsotpFrameType::consecutive)) {
       next_ = 1;
@@ -114,9 +114,9 @@ class LossyLine {
   Count count_;
 };
 
-// A wrong sequence number within a datagram is always noticed. The other case is a run of lost
-// frames over a border, after which the numbers fit. Its length is the number of frames of a
-// datagram, less 16 (32 …) if the datagram has more. 18 frames are the worst case: two lost frames
+// A wrong sequence number within a datagram is always noticed. If frames over a border are lost,
+// the numbers may fit again. The run of lost frames then has the number of frames of a datagram,
+// less 16 (32 …) if the datagram has more. 18 frames are the worst case, because two lost frames
 // are enough.
 TEST(IsotpLoss, SeldomJoinsTwoDatagrams) {
   const struct {

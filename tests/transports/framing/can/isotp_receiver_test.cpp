@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// By the clauses of ISO 15765-2:2016.
+// The test cases follow the clauses of ISO 15765-2:2016.
 #include "transports/framing/can/isotp_receiver.hpp"
 
 #include <gtest/gtest.h>
@@ -48,7 +48,7 @@ struct Receiver {
     return arrival.error;
   }
   IsotpError take(const std::string& hex) { return take(frame_of(id, hex)); }
-  // The flow control that the receiver sends now; empty if there is none.
+  // The flow control that the receiver sends now. Empty if there is none.
   std::string answer() {
     CanFrame frame;
     if (!isotp.offer(now, frame)) return "";
@@ -65,7 +65,7 @@ struct Receiver {
   std::uint32_t now = 0;
 };
 
-// Every transfer that began has one end or is under way; every frame is counted once.
+// Every transfer that began has one end or is under way. Every frame is counted once.
 void expect_counters_add_up(const IsotpReceiver& receiver) {
   const IsotpReceiverCounters& c = receiver.counters();
   EXPECT_EQ(c.started, c.datagrams + c.send_timeout + c.consecutive_timeout +
@@ -250,8 +250,8 @@ TEST(IsotpReceiver, AnyOtherSequenceNumberEndsTheTransfer) {
   }
 }
 
-// The end of one transfer and the beginning of the next are lost. The sequence numbers fit again,
-// except the number of the short frame between them.
+// The end of one transfer and the beginning of the next transfer are lost. The sequence numbers fit
+// again, except the number of the short frame between the transfers.
 TEST(IsotpReceiver, AShortFrameWithAWrongNumberEndsTheTransfer) {
   Receiver receiver(listening());
   receiver.take("10 19 61 61 61 61 61 61");
@@ -315,8 +315,8 @@ TEST(IsotpReceiver, AMalformedFrameDoesNotInterrupt) {
   expect_counters_add_up(receiver.isotp);
 }
 
-// A frame that arrives in time may be read late, and the receiver may be asked for a frame to send
-// before.
+// A frame that arrives in time may be read late. Before that, the caller may request a frame to
+// send.
 TEST(IsotpReceiver, ALatePollDoesNotTimeOutTheTransfer) {
   Receiver receiver(controlled());
   receiver.take("10 0A 01 02 03 04 05 06");
@@ -329,7 +329,7 @@ TEST(IsotpReceiver, ALatePollDoesNotTimeOutTheTransfer) {
   expect_counters_add_up(receiver.isotp);
 }
 
-// 9.8.2, N_Cr: from the flow control or the last consecutive frame.
+// 9.8.2, N_Cr: the time since the flow control or the last consecutive frame.
 TEST(IsotpReceiver, TimesOutWhenConsecutiveFramesAreMissing) {
   for (const IsotpReceiverOptions& options : {controlled(), listening()}) {
     for (int frames = 0; frames < 3; ++frames) {

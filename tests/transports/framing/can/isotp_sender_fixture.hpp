@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An ISO-TP sender in virtual time, for its tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -43,7 +42,6 @@ struct Sender : IsotpSender {
   explicit Sender(const IsotpSenderOptions& options, std::uint32_t start_us = 0)
       : IsotpSender(options), now(start_us) {}
 
-  // Accepts all frames that the sender offers now.
   Frames take() {
     Frames frames;
     CanFrame frame;

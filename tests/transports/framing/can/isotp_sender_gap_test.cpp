@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// By the clauses of ISO 15765-2:2016, 9.6.5: the gap between frames, requested by flow control or
-// by options.
+// The gap between frames, requested by flow control or by options. The test cases follow ISO
+// 15765-2:2016, 9.6.5.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -31,7 +31,7 @@ TEST(IsotpSender, ObeysTheNewestFlowControl) {
   EXPECT_EQ(sender.deadline().at_us, 1000U);
 }
 
-// 9.6.5.4, 9.6.5.5: from the accepted frame to the next frame.
+// 9.6.5.4, 9.6.5.5: the gap between an accepted frame and the next frame.
 TEST(IsotpSender, KeepsTheGapThatTheReceiverAsksFor) {
   for (int stmin = 0; stmin < 256; ++stmin) {
     const std::uint32_t gap_us = stmin <= 0x7F                    ? stmin * 1000U
@@ -79,7 +79,8 @@ TEST(IsotpSender, KeepsTheLongerOfItsOwnAndTheRequestedGap) {
   }
 }
 
-// 9.6.5.4: STmin is the gap between any two consecutive frames, whatever frames are between them.
+// 9.6.5.4: STmin is the gap between any two consecutive frames, also if other frames are between
+// them.
 TEST(IsotpSender, KeepsTheGapBetweenTwoBlocks) {
   const struct {
     std::uint32_t answered_us;  // after the last frame
@@ -120,7 +121,7 @@ TEST(IsotpSender, KeepsTheGapAfterFlowControlWithAnEarlyTimeStamp) {
   EXPECT_EQ(sender.deadline().at_us, 101000U);
 }
 
-// A gap that begins before a frame is on the bus would be too short on the wire.
+// A gap that begins before its frame is on the bus would be too short on the wire.
 TEST(IsotpSender, RestartsTheGapWhenItsFrameIsSentLate) {
   Sender sender(classic());
   sender.start(counted(40));

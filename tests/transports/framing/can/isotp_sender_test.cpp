@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// By the clauses of ISO 15765-2:2016.
+// The test cases follow the clauses of ISO 15765-2:2016.
 #include "transports/framing/can/isotp_sender.hpp"
 
 #include <gtest/gtest.h>
@@ -108,7 +108,7 @@ TEST(IsotpSender, RefusesASecondOrEmptyTransfer) {
   EXPECT_EQ(sender.counters().started, 2U);
 }
 
-// A full queue delays frames, but does not lose them.
+// A full queue delays frames, but does not lose frames.
 TEST(IsotpSender, OffersTheSameFrameUntilItIsAccepted) {
   Sender sender(burst());
   sender.start(counted(20));
@@ -120,7 +120,7 @@ TEST(IsotpSender, OffersTheSameFrameUntilItIsAccepted) {
       EXPECT_EQ(hex_of(frame), expected);
     }
     sender.frame_sent(sender.now);
-    sender.frame_sent(sender.now);  // already accepted: no effect
+    sender.frame_sent(sender.now);  // already accepted, so this has no effect
   }
   EXPECT_EQ(sender.counters().datagrams, 1U);
   EXPECT_EQ(sender.counters().frames, 3U);
@@ -150,8 +150,8 @@ TEST(IsotpSender, TimesOutWhenTheBusDoesNotAcceptAFrame) {
   }
 }
 
-// Flow control that arrives in time may be read late, and the sender may be asked for a frame
-// before.
+// Flow control that arrives in time may be read late. Before that, the caller may request a frame
+// to send.
 TEST(IsotpSender, ALatePollDoesNotTimeOutTheTransfer) {
   Sender sender(classic());
   sender.start(counted(10));
@@ -164,8 +164,7 @@ TEST(IsotpSender, ALatePollDoesNotTimeOutTheTransfer) {
   expect_counters_add_up(sender);
 }
 
-// 9.6.5.3: flow control after the first frame and after each block of BS frames, but not after the
-// last block.
+// 9.6.5.3: flow control follows the first frame and each block of BS frames except the last block.
 TEST(IsotpSender, SendsBlocksOfTheRequestedSize) {
   const struct {
     std::string flow_control;

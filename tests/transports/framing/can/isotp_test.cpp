@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Sender and receiver joined frame by frame in virtual time. A failure prints RC_PARAMS with its
-// seed. To run it again, set the same RC_PARAMS in the environment.
+// seed. To repeat the failure, set the same RC_PARAMS in the environment.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
@@ -76,7 +76,7 @@ std::vector<CanFrame> frames_of(const Options& options, const std::string& datag
   return frames;
 }
 
-// The result of receiving the frames, one every `step_us`.
+// The result of receiving the frames, one frame every `step_us`.
 struct Received {
   Datagrams datagrams;
   IsotpReceiverCounters counters;
@@ -136,7 +136,7 @@ class IsotpBus {
   IsotpSender sender;
 
  private:
-  // To the next deadline, or 200 us if the bus refuses a frame.
+  // Advances to the next deadline, or by 200 us if the bus refuses a frame.
   void advance() {
     std::uint32_t wait = 200;
     const IsotpDeadline deadlines[] = {sender.deadline(), receiver.deadline()};
@@ -231,8 +231,7 @@ RC_GTEST_PROP(Isotp, WithFlowControlALossCostsTheDatagramAndIsToldOf, ()) {
   RC_ASSERT(r.started == r.datagrams + r.consecutive_timeout + r.wrong_sequence_number);
 }
 
-// Within one transfer: any frames may be lost; frames may be duplicated or overtaken by fewer than
-// 16 numbers.
+// Within one transfer, any frames may be lost, duplicated, or overtaken by fewer than 16 numbers.
 RC_GTEST_PROP(Isotp, DamageToTheOrderOfFramesGivesTheBytesOrNothing, ()) {
   const Options options = burst(*rc::gen::element<std::uint8_t>(8, 8, 12, 20, 64));
   const auto size = static_cast<std::size_t>(*rc::gen::inRange(1, 1025));
@@ -296,7 +295,7 @@ RC_GTEST_PROP(Isotp, AListenerInALossyStreamHearsWhatWasSentOrNothing, ()) {
 TEST(Isotp, LossWithoutFlowControlCanJoinTwoDatagrams) {
   const struct {
     std::size_t size, kept;
-    std::size_t lost;  // consecutive frames, including the second first frame
+    std::size_t lost;  // lost consecutive frames, including the second first frame
   } cases[] = {
       {6 + 7 * 15, 10, 16},  // transfers of 16 frames
       {6 + 7 * 31, 20, 16},  // transfers of 32 frames
@@ -318,7 +317,7 @@ TEST(Isotp, LossWithoutFlowControlCanJoinTwoDatagrams) {
         << "only the CRC of the datagram detects this";
 
     Options patient = burst();
-    patient.receiver.n_cr_us = 100;  // shorter than the pause between the transfers
+    patient.receiver.n_cr_us = 100;  // less than the pause between the transfers
     EXPECT_EQ(receive(patient, frames).datagrams, Datagrams{});
   }
 }

@@ -27,7 +27,7 @@ using test::str;
 using test::with_crc;
 using Bytes = std::vector<std::uint8_t>;
 
-// Empty if the datagram travels as plain text.
+// Empty if the datagram is sent as plain text.
 Bytes packed_bytes(const std::string& datagram, std::size_t capacity = max_datagram) {
   Bytes bytes(max_datagram, 0xEE);
   bytes.resize(pack(datagram, bytes.data(), capacity));
@@ -46,8 +46,8 @@ std::string hex(const Bytes& bytes) {
   return text;
 }
 
-// The number of classic frames in ISO-TP: one frame for up to 7 bytes, otherwise 6 bytes and then 7
-// in each.
+// The number of classic frames in ISO-TP: one frame for up to 7 bytes, otherwise 6 bytes in the
+// first frame and 7 bytes in each further frame.
 std::size_t frames(std::size_t size) { return size <= 7 ? 1 : 1 + (size - 6 + 6) / 7; }
 
 std::string fields_of(FieldSet set, const State& state) {
@@ -57,7 +57,7 @@ std::string fields_of(FieldSet set, const State& state) {
   return str(writer.finish(state.pnum, state.t_ms));
 }
 
-// A state of a busy board, a day after it was switched on.
+// A state of a busy board, a day after power-up.
 State busy_state() {
   State state;
   const std::int32_t volts[] = {2631, 1207, 503, 1198, 97, 330};
@@ -230,7 +230,7 @@ TEST(PackedForm, EveryWordHasOneCode) {
   }
 }
 
-// --- datagrams that travel as plain text
+// --- datagrams that are sent as plain text
 
 TEST(PackedForm, SendsANonCanonicalDatagramAsText) {
   const std::string good = "O:358,1,1;PNum:66;T:1699276044383;";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A UDP host whose network disappears and returns. Each test runs in a separate network
-// (network_namespaces(7)) and in a separate process, because a process cannot leave such a network.
+// (network_namespaces(7)) and in a separate process, because a process cannot leave its network.
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ bool enter_a_network_of_our_own() {
   return ::unshare(CLONE_NEWNET) == 0 || ::unshare(CLONE_NEWUSER | CLONE_NEWNET) == 0;
 }
 
-// Sets or removes the address of an interface of that network, the loopback or its alias.
+// Sets or removes the address of an interface of the separate network, the loopback or its alias.
 bool set_address(const char* interface, const char* dotted) {
   const FileDescriptor control(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   ifreq request{};
@@ -78,7 +78,7 @@ int lose_and_regain_the_network() {
   if (!run_until(io, [&] { return at_board.has("3"); })) return 22;
   if (host->counters().downs != 1 || host->counters().ups != 2) return 23;
 
-  if (!set_loopback(false)) return 24;  // this time the host sends nothing
+  if (!set_loopback(false)) return 24;  // this time the host sends no datagram
   const auto lost_again = Clock::now();
   if (!run_until(io, [&] { return at_host.count(Kind::down) == 2; })) return 25;
   if (at_host.last(Kind::down)->when - lost_again > std::chrono::milliseconds(50)) return 26;
@@ -128,7 +128,7 @@ TEST(UdpNetwork, LossForASecondBoardDoesNotAffectTheFirst) {
   EXPECT_EQ(run_in_child(lose_the_network_of_the_second), 0);
 }
 
-// The address of this computer from which the host sends is removed.
+// The address from which the host sends is removed.
 int lose_the_address_that_is_sent_from() {
   if (!enter_a_network_of_our_own() || !set_loopback(true) || !set_second(true)) return 10;
   asio::io_context io;
@@ -152,8 +152,8 @@ TEST(UdpNetwork, NamesTheLostAddressOfThisComputer) {
 // ThreadSanitizer does not allow a child of a program with threads to start a thread, as a lookup
 // does.
 #ifndef __SANITIZE_THREAD__
-// The board moves to a new address while the network of its old address is lost. The host follows
-// it.
+// The board moves to another address while the network of its old address is lost. The host follows
+// the board.
 int follow_the_board_out_of_a_lost_network() {
   if (!enter_a_network_of_our_own() || !set_loopback(true) || !set_second(true)) return 10;
   asio::io_context io;

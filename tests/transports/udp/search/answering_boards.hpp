@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boards on the loopback that answer every datagram, each at a different address and all at one
-// port. They run in a thread, because a search blocks.
+// Boards on the loopback that answer every datagram, each board at a different address and all
+// boards at one port. They run in a thread, because a search blocks.
 #pragma once
 
 #include <asio/executor_work_guard.hpp>
@@ -39,8 +39,8 @@ class AnsweringBoards {
   AnsweringBoards(const AnsweringBoards&) = delete;
   AnsweringBoards& operator=(const AnsweringBoards&) = delete;
 
-  // Adds a board at 127.0.<address>, such as "0.2"; replaces a board at that address. It answers
-  // each question from number `first` on with all `answers`.
+  // Adds a board at 127.0.<address>, such as "0.2", or replaces the board at this address. The
+  // board answers each question from number `first` on with all `answers`.
   void add(const std::string& address, Answers answers, int first = 1) {
     on_thread([&] {
       boards_.erase(address);
@@ -53,7 +53,7 @@ class AnsweringBoards {
       boards_[address] = std::move(board);
     });
   }
-  // Answers from another port of that address before the board answers.
+  // Answers from another port of the address before the board answers.
   void add_elsewhere(const std::string& address, const std::string& answer) {
     on_thread([&] {
       boards_.at(address)->elsewhere = answer;

@@ -144,12 +144,12 @@ TEST(I2cBusModel, AnInterruptingTransferCutsATransferShort) {
   EXPECT_EQ(bench.chip.bytes, (std::deque<std::uint8_t>{1}));
   EXPECT_EQ(other.bytes, (std::deque<std::uint8_t>{7, 8}));
   EXPECT_EQ(other.stops, 2);
-  EXPECT_EQ(bench.chip.stops, 1);  // the stop of the recovery
+  EXPECT_EQ(bench.chip.stops, 1);  // the recovery ends with a stop
   const auto& all = bench.log.transfers();
   ASSERT_EQ(all.size(), 4U);
   EXPECT_EQ(all.back().result, I2cResult::timeout);
-  // The interrupted transfer takes the time of the other transfers and of its two bytes. It does
-  // not wait for a held line.
+  // The interrupted transfer takes the time of the other transfers and of its own two bytes. It
+  // does not wait for a held line.
   EXPECT_EQ(all.back().duration_ns,
             all[0].duration_ns + all[1].duration_ns + all[2].duration_ns + (9 + 1) * 2500U);
   EXPECT_EQ(bench.write({4}), I2cResult::ok);

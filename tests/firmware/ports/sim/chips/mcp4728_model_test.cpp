@@ -28,7 +28,7 @@ struct Mcp4728ModelBench {
 };
 
 TEST(Mcp4728Model, FollowsTheSequentialWriteExampleOfTheDataSheet) {
-  // Figure 7-4: A VDD/2, B VDD full, C 2.048 V reference gain 2 half, D full.
+  // Figure 7-4: A VDD/2; B full VDD; C 2.048 V reference, gain 2, half scale; D full scale.
   Mcp4728ModelBench bench;
   EXPECT_EQ(bench.write({0x50, 0x08, 0x00, 0x0F, 0xFF, 0x98, 0x00, 0x9F, 0xFF}), I2cResult::ok);
   EXPECT_NEAR(bench.chip.volts(0), 2.5, 1e-6);

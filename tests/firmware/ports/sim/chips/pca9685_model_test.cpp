@@ -133,7 +133,7 @@ TEST(Pca9685Model, ChannelsThatWereRunningWaitForRestart) {
   bench.write({0x00, 0x31});
   EXPECT_EQ(bench.read(0x00, 1), Bytes{0xB1});
   bench.write({0x00, 0x21});
-  bench.write({0x00, 0xA1});  // too early
+  bench.write({0x00, 0xA1});  // too early: the oscillator needs 500 us
   EXPECT_EQ(bench.read(0x00, 1), Bytes{0xA1});
   bench.bus.advance(600);
   EXPECT_EQ(bench.chip.duty(0), 0);
@@ -158,7 +158,7 @@ TEST(Pca9685Model, AnswersAllCallAndSubAddressesAsConfigured) {
   std::uint8_t byte = 0;
   EXPECT_EQ(bench.bus.write_read(0x70, nullptr, 0, &byte, 1), I2cResult::ok);
   EXPECT_EQ(bench.bus.write_read(0x71, nullptr, 0, &byte, 1), I2cResult::no_acknowledge);
-  bench.write({0x00, 0x18});  // SUB1, no ALLCALL
+  bench.write({0x00, 0x18});  // SUB1 on, ALLCALL off
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x70), I2cResult::no_acknowledge);
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x71), I2cResult::ok);
   bench.write({0x00, 0x14});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The devices on the user's I2C bus, register for register, as in their data sheets.
+// The models of the devices on the user's I2C bus have the registers of their data sheets.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -55,7 +55,7 @@ TEST_F(UserDeviceModels, Mpu6050ReportsTheSetMotionWithoutOverflow) {
 
 TEST_F(UserDeviceModels, Ina219ConvertsByItsCalibration) {
   EXPECT_EQ(read(0x40, {0x00}, 2), (Bytes{0x39, 0x9F}));
-  devices.ina219.measure(11980, 20000);  // the data sheet's example, 8.5.1
+  devices.ina219.measure(11980, 20000);  // the example of data sheet 8.5.1
   EXPECT_EQ(read(0x40, {0x01}, 2), (Bytes{0x07, 0xD0}));
   EXPECT_EQ(read(0x40, {0x02}, 2), (Bytes{0x5D, 0x9A}));  // 2995 << 3 and CNVR
   EXPECT_EQ(read(0x40, {0x04}, 2), (Bytes{0x00, 0x00})) << "without a calibration";

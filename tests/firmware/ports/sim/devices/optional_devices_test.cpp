@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The optional devices on the user's I2C bus, register for register, as in their data sheets.
+// The models of the optional devices on the user's I2C bus have the registers of their data sheets.
 #include "firmware/ports/sim/devices/optional_devices.hpp"
 
 #include <gtest/gtest.h>
@@ -87,7 +87,7 @@ TEST_F(OptionalDeviceModels, Bno055TakesItsTimeToChangeItsMode) {
   transfer.address = 0x28;
   transfer.out = mode;
   transfer.out_size = sizeof mode;
-  write(0x28, {0x3F, 0x20});  // a reset forgets the earlier mode
+  write(0x28, {0x3F, 0x20});  // a reset also resets the mode
   bus.begin(transfer);
   bus.advance(1000);
   EXPECT_EQ(read(0x28, {0x08}, 6), Bytes(6)) << "1 ms";
