@@ -98,7 +98,7 @@ done
 echo 'install: an Asio of its own disturbs nobody'
 
 # A project that includes the tree gets only the library, needs no library of the tools, and does not install the tree.
-without=(CLI11=ON nlohmann_json=ON CycloneDDS=ON GTest=ON rapidcheck=ON)
+without=(CLI11=ON CycloneDDS=ON GTest=ON rapidcheck=ON)
 cmake -G Ninja -S "$source_tree/tests/install/subproject" -B "$work/subproject" -DR4LINK_SOURCE="$source_tree" \
   -DCMAKE_CXX_COMPILER="$cxx" "${without[@]/#/-DCMAKE_DISABLE_FIND_PACKAGE_}" >"$work/cmake.log" 2>&1 ||
   {

@@ -11,7 +11,7 @@ import pytest
 TOOLS = pathlib.Path(__file__).resolve().parents[2] / 'tools'
 PRODUCT = {'g++', 'cmake', 'ninja-build', 'pkg-config', 'libasio-dev', 'libboost-dev', 'libserialport-dev',
            'libnl-route-3-dev', 'libfmt-dev', 'libdeflate-dev', 'libzstd-dev', 'liblz4-dev', 'libcli11-dev',
-           'nlohmann-json3-dev', 'cyclonedds-dev', 'cyclonedds-tools'}
+           'nlohmann-json3-dev', 'libjs-dygraphs', 'cyclonedds-dev', 'cyclonedds-tools'}
 PARTS = {'cyclonedds-dev', 'cyclonedds-tools'}
 UNIT_TESTS = {'libgtest-dev', 'librapidcheck-dev', 'libbenchmark-dev', 'python3', 'python3-pytest', 'libpython3-dev',
               'pybind11-dev'}

@@ -151,7 +151,7 @@ def test_plots_can_be_paused_zoomed_and_read(browser):
         page.click('#pause')
         picture_moves(page)
         box = page.evaluate('(({x, y, width, height}) => [x, y, width, height])'
-                            '(document.querySelector(".u-over").getBoundingClientRect())')
+                            '(document.querySelector(".area").getBoundingClientRect())')
         middle = box[1] + box[3] / 2
         page.do('drag', **{'from': [box[0] + 0.5 * box[2], middle], 'to': [box[0] + 0.98 * box[2], middle]})
         page.until_text('#pause', 'Go on')

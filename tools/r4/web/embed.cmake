@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# cmake -D FOLDER=… -D OUTPUT=… -P embed.cmake: converts the page's files to C++.
-file(GLOB files ${FOLDER}/*.html ${FOLDER}/*.js ${FOLDER}/*.css ${FOLDER}/*.svg)
+# cmake -D FILES=… -D OUTPUT=… -P embed.cmake: converts the page's files to C++.
 set(arrays "")
 set(table "")
 set(count 0)
-foreach(file ${files})
+foreach(file ${FILES})
   get_filename_component(name ${file} NAME)
   file(READ ${file} hex HEX)
   string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${hex}")
@@ -12,8 +11,7 @@ foreach(file ${files})
   string(APPEND table "    {\"${name}\", {reinterpret_cast<const char*>(file${count}), sizeof file${count} - 1}},\n")
   math(EXPR count "${count} + 1")
 endforeach()
-file(WRITE ${OUTPUT} "// Made of ${FOLDER}.
-#include \"tools/r4/web/server/page_files.hpp\"
+file(WRITE ${OUTPUT} "#include \"tools/r4/web/server/page_files.hpp\"
 
 namespace r4::tool::web {
 namespace {

@@ -6,7 +6,11 @@ import {board_name, clock_text, element, put, value_text} from './text.js';
 const GAP_MS = 500;  // states further apart are not joined
 const COLOURS = 8;   // --line0 … of the style; further lines are dashed
 const MOST_ZOOM_MS = 50;
-const {uPlot} = globalThis;
+const KEY_STEP = 0.005;  // of a chart's width
+const LEAST_DRAG = 0.005;
+const {Dygraph} = globalThis;
+// The legend sets a style attribute, which the page's policy forbids.
+Dygraph.PLUGINS = Dygraph.PLUGINS.filter((plugin) => plugin !== Dygraph.Plugins.Legend);
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -16,43 +20,35 @@ function kind_of(hello, field) {
   return part ? `${part} ${hello.units[field]}` : hello.units[field];
 }
 
-// Gaps in a column for uPlot, as pairs of pixels.
-function gaps_of(plot, series, first, last) {
-  const [times, values] = [plot.data[0], plot.data[series]];
-  const gaps = [];
-  let before = -1;
-  for (let i = first; i <= last; ++i) {
-    if (Number.isNaN(values[i])) continue;
-    if (before >= 0 && times[i] - times[before] > GAP_MS) {
-      gaps.push([plot.valToPos(times[before], 'x', true), plot.valToPos(times[i], 'x', true)]);
-    }
-    before = i;
-  }
-  return gaps;
-}
-
-function range_of(plot) {
-  let low = Infinity;
-  let high = -Infinity;
-  for (const values of plot.data.slice(1)) {
-    for (const value of values) {
-      if (value < low) low = value;
-      if (value > high) high = value;
-    }
-  }
-  if (low > high) return [0, 1];
-  const margin = (high - low) * 0.08 || Math.max(Math.abs(high) * 0.02, 0.5);
-  return [low - margin, high + margin];
+// Rows for Dygraphs: a null joins the values beside it, a NaN does not.
+function rows_of([times, ...columns]) {
+  const seen_ms = columns.map(() => -Infinity);
+  const rows = [];
+  times.forEach((time, i) => {
+    if (i > 0 && time - times[i - 1] > GAP_MS) rows.push([times[i - 1] + 1, ...columns.map(() => NaN)]);
+    rows.push([time, ...columns.map((values, k) => {
+      if (Number.isNaN(values[i])) return time - seen_ms[k] > GAP_MS ? NaN : null;
+      seen_ms[k] = time;
+      return values[i];
+    })]);
+  });
+  return rows;
 }
 
 class Chart {
   #plot = null;
   #readout = [];
   #time = element('span', {className: 'hint'});
+  #picked = element('div', {className: 'picked', hidden: true});
+  #canvas = element('div', {className: 'canvas'});
+  #size = '';
+  #drag_from = null;
   #hello;
+  #plots;
 
   constructor(hello, board, fields, plots) {
     this.#hello = hello;
+    this.#plots = plots;
     this.board = board;
     this.fields = fields;
     const legend = element('ul', {className: 'readout'});
@@ -63,85 +59,92 @@ class Chart {
     });
     this.area = element('div', {className: 'area', tabIndex: 0, role: 'img', 'aria-label':
       `${fields.map((field) => hello.fields[field]).join(', ')} of ${board_name(hello.boards[board])} over time. ` +
-      'Left and right move the readout, plus and minus zoom.'});
+      'Left and right move the readout, plus and minus zoom.'}, this.#canvas, this.#picked);
     const title = hello.boards.length > 1 ? [element('strong', {}, board_name(hello.boards[board]))] : [];
     this.node = element('figure', {}, element('figcaption', {}, ...title, legend, this.#time), this.area);
-    this.area.onkeydown = (key) => this.#key(key, plots);
-    this.#plots = plots;
+    this.area.onkeydown = (key) => this.#key(key);
+    this.area.ondblclick = () => plots.go_on();
+    this.area.onpointerdown = (event) => { this.#drag_from = this.#share_at(event); };
+    this.area.onpointermove = (event) => this.#point(event);
+    this.area.onpointerup = (event) => this.#pick(event);
+    this.area.onpointerleave = () => { this.#drag_from = null; this.#picked.hidden = true; plots.point(null); };
   }
-  #plots;
 
-  #key(key, plots) {
+  #key(key) {
     const step = {ArrowLeft: -1, ArrowRight: 1}[key.key];
-    if (step && this.#plot) {
-      const left = this.#plot.cursor.left < 0 ? this.#plot.over.clientWidth : this.#plot.cursor.left;
-      this.#plot.setCursor({left: Math.max(0, Math.min(this.#plot.over.clientWidth - 1, left + step * 4)), top: 1});
+    if (step) {
+      this.#plots.point(Math.max(0, Math.min(1, (this.#plots.pointed ?? 1) + step * KEY_STEP)));
     } else if (key.key === '+') {
-      plots.zoom(0.5);
+      this.#plots.zoom(0.5);
     } else if (key.key === '-') {
-      plots.zoom(2);
+      this.#plots.zoom(2);
     } else {
       return;
     }
     key.preventDefault();
   }
 
-  #make(width, height) {
-    const text = css('--quiet');
-    const grid = {stroke: css('--grid'), width: 1};
-    const axis = {stroke: text, font: '11px system-ui, sans-serif', grid, ticks: {show: false}};
-    this.#plot = new uPlot({
-      width, height, ms: 1, padding: [8, 28, 0, 0],
-      legend: {show: false},
-      cursor: {drag: {x: true, y: false, setScale: false}, sync: {key: 'r4', setSeries: false}, points: {size: 6}},
-      select: {show: true},
-      scales: {x: {time: false}, y: {range: range_of}},
-      axes: [
-        {...axis, size: 22, space: 80, values: (_, splits) => splits.map((at) => clock_text(at, this.#plots.digits()))},
-        {...axis, size: 52, gap: 4},
-      ],
-      series: [{}, ...this.fields.map((_, index) => ({
-        stroke: css(`--line${index % COLOURS}`), width: 1.5, points: {show: false}, gaps: gaps_of,
-        dash: index >= COLOURS ? [6, 4] : undefined,
-      }))],
-      hooks: {
-        setSelect: [(plot) => {
-          if (plot.select.width < 4) return;
-          this.#plots.show(plot.posToVal(plot.select.left, 'x'), plot.posToVal(plot.select.left + plot.select.width, 'x'));
-          plot.setSelect({left: 0, width: 0, top: 0, height: 0}, false);
-        }],
-        setCursor: [() => this.read()],
-      },
-    }, [[], ...this.fields.map(() => [])], this.area);
-    this.#plot.over.ondblclick = () => this.#plots.go_on();
+  // 0 at the left end of the lines, 1 at the right end.
+  #share_at(event) {
+    const {x, w} = this.#plot?.getArea() ?? {x: 0, w: 1};
+    return Math.max(0, Math.min(1, (event.clientX - this.area.getBoundingClientRect().x - x) / w));
+  }
+
+  #point(event) {
+    const share = this.#share_at(event);
+    this.#plots.point(share);
+    if (this.#drag_from === null || !this.#plot) return;
+    const {x, w} = this.#plot.getArea();
+    this.#picked.style.left = `${x + w * Math.min(share, this.#drag_from)}px`;
+    this.#picked.style.width = `${w * Math.abs(share - this.#drag_from)}px`;
+    this.#picked.hidden = false;
+  }
+
+  #pick(event) {
+    const [from, to] = [this.#drag_from, this.#share_at(event)].sort((a, b) => a - b);
+    const dragged = this.#drag_from !== null && !this.#picked.hidden && to - from > LEAST_DRAG;
+    this.#drag_from = null;
+    this.#picked.hidden = true;
+    if (dragged) this.#plots.show_shares(from, to);
+  }
+
+  #make(rows) {
+    const labels = this.fields.map((field) => this.#hello.fields[field]);
+    const line = (index) => ({strokePattern: index >= COLOURS ? [6, 4] : null});
+    this.#plot = new Dygraph(this.#canvas, rows, {
+      labels: ['time', ...labels], colors: labels.map((_, index) => css(`--line${index % COLOURS}`)),
+      series: Object.fromEntries(labels.map((label, index) => [label, line(index)])),
+      strokeWidth: 1.5, connectSeparatedPoints: true, interactionModel: {}, rightGap: 28,
+      yRangePad: 8, highlightCircleSize: 3, gridLineColor: css('--grid'), axisLineColor: css('--grid'), axisLabelFontSize: 11,
+      axes: {x: {ticker: Dygraph.dateTicker, axisLabelFormatter: (at) => clock_text(at, this.#plots.digits()), pixelsPerLabel: 80},
+             y: {axisLabelWidth: 44, pixelsPerLabel: 20}},
+    });
   }
 
   restyle() { this.#plot?.destroy(); this.#plot = null; }
 
   draw(history, from_ms, to_ms) {
-    const width = this.area.clientWidth;
-    const height = this.area.clientHeight;
+    const [width, height] = [this.#canvas.clientWidth, this.#canvas.clientHeight];
     if (width < 40 || height < 40) return false;
-    if (!this.#plot) this.#make(width, height);
-    if (this.#plot.width !== width || this.#plot.height !== height) this.#plot.setSize({width, height});
-    const data = history.between(from_ms, to_ms, this.fields);
-    this.#plot.batch(() => {
-      this.#plot.setData(data, false);
-      this.#plot.setScale('x', {min: from_ms, max: to_ms});
-    });
+    const file = rows_of(history.between(from_ms, to_ms, this.fields));
+    if (!file.length) return false;
+    if (!this.#plot) this.#make(file);
+    if (this.#size !== `${width} ${height}`) this.#plot.resize();
+    this.#size = `${width} ${height}`;
+    this.#plot.updateOptions({file, dateWindow: [from_ms, to_ms]});
     this.read();
-    return data[0].length > 1;
+    return file.length > 1;
   }
 
   read() {
     if (!this.#plot) return;
-    const times = this.#plot.data[0];
-    const at = this.#plot.cursor.idx;
-    const under = at !== null && at !== undefined && this.#plot.cursor.left >= 0;
-    const index = under ? at : times.length - 1;
-    put(this.#time, under && times.length ? clock_text(times[index], 3) : '');
+    const {x, w} = this.#plot.getArea();
+    const {pointed} = this.#plots;
+    const row = pointed === null ? this.#plot.numRows() - 1 : this.#plot.findClosestRow(x + pointed * w);
+    if (pointed === null) this.#plot.clearSelection(); else this.#plot.setSelection(row);
+    put(this.#time, pointed === null ? '' : clock_text(this.#plot.getValue(row, 0), 3));
     this.fields.forEach((field, series) => put(this.#readout[series],
-      times.length ? value_text(this.#plot.data[series + 1][index], this.#hello.units[field]) : '–'));
+      value_text(this.#plot.getValue(row, series + 1) ?? NaN, this.#hello.units[field])));
   }
 }
 
@@ -153,6 +156,7 @@ export class Plots {
   #to_ms = 0;
   #clock_ahead_ms;
   paused = false;
+  pointed = null;
 
   constructor(hello, histories) {
     this.#hello = hello;
@@ -190,6 +194,17 @@ export class Plots {
   digits() {
     const [from_ms, to_ms] = this.#stretch();
     return to_ms - from_ms < 800 ? 3 : to_ms - from_ms < 8000 ? 1 : 0;
+  }
+
+  // Moves the readout of all charts to a share of their width; null follows the newest state.
+  point(share) {
+    this.pointed = share;
+    this.#charts.forEach((chart) => chart.read());
+  }
+
+  show_shares(from, to) {
+    const [from_ms, to_ms] = this.#stretch();
+    this.show(from_ms + from * (to_ms - from_ms), from_ms + to * (to_ms - from_ms));
   }
 
   show(from_ms, to_ms) {
