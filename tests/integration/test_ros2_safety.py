@@ -174,7 +174,7 @@ def test_a_restarted_node_does_not_clear_an_earlier_stop():
         board.state('SAFE', 'stop')
         with Ros2(domain, board.host_url, '--arm') as ros2:
             told = ros2.logged('not armed: stopped before this program began')['text']
-            assert told.endswith('clear it on purpose: call ~/clear, then ~/arm'), told
+            assert told.endswith('clear it on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm'), told
             assert not any(each.get('supply') for each in board.log)
             join(ros2, peer, 'R4_Command', STRING)
             join(ros2, peer, 'arm', BOOL)

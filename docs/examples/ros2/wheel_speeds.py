@@ -4,7 +4,7 @@
 
     r4 ros2 serial:auto --counts-per-turn 4096 --deadline 0.5
     python3 wheel_speeds.py
-    ros2 topic pub --once /arm std_msgs/msg/Bool '{data: true}'
+    ros2 topic pub --once --keep-alive 1 /arm std_msgs/msg/Bool '{data: true}'
 
 The cycle is the cycle of ros2_control: read, update, write, once for each state of the board (100 Hz). Without states
 this node publishes nothing, and r4 ros2 stops the motors at its deadline.

@@ -26,9 +26,9 @@ ROS_STATIC_PEERS or CYCLONEDDS_URI allow more.
 
 Examples:
   r4 ros2 serial:auto
-  ros2 topic pub --once /arm std_msgs/msg/Bool '{data: true}'
+  ros2 topic pub --once --keep-alive 1 /arm std_msgs/msg/Bool '{data: true}'
   ros2 topic pub --rate 10 /osmc1/command std_msgs/msg/Float32 '{data: 0.1}'
-  ros2 topic pub --once /stop std_msgs/msg/Bool '{data: true}'
+  ros2 topic pub --rate 10 /stop std_msgs/msg/Bool '{data: true}'
   r4 ros2 udp://192.168.0.125 --drive osmc1,-osmc2 --wheel-separation 0.4 --full-speed 1.5
   r4 ros2 'can://can0?node=0-3' --namespace robot       /robot/board0/R4 …
 

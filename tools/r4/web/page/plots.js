@@ -20,18 +20,34 @@ function kind_of(hello, field) {
   return part ? `${part} ${hello.units[field]}` : hello.units[field];
 }
 
-// Rows for Dygraphs: a null joins the values beside it, a NaN does not.
-function rows_of([times, ...columns]) {
-  const seen_ms = columns.map(() => -Infinity);
+// The lowest and the highest value in the order of their times; null if all values are missing.
+function extremes(values, from, end) {
+  let [low, high] = [-1, -1];
+  for (let i = from; i < end; ++i) {
+    if (Number.isNaN(values[i])) continue;
+    if (low < 0 || values[i] < values[low]) low = i;
+    if (high < 0 || values[i] > values[high]) high = i;
+  }
+  return low < 0 ? [null, null] : [values[Math.min(low, high)], values[Math.max(low, high)]];
+}
+
+// Rows for Dygraphs, at most two a pixel, with the extremes of its states. A null joins the values
+// beside it, a NaN does not.
+function rows_of([times, ...columns], pixel_ms) {
   const rows = [];
-  times.forEach((time, i) => {
-    if (i > 0 && time - times[i - 1] > GAP_MS) rows.push([times[i - 1] + 1, ...columns.map(() => NaN)]);
-    rows.push([time, ...columns.map((values, k) => {
-      if (Number.isNaN(values[i])) return time - seen_ms[k] > GAP_MS ? NaN : null;
-      seen_ms[k] = time;
-      return values[i];
-    })]);
-  });
+  const seen_ms = columns.map(() => -Infinity);
+  const pixel_at = (i) => Math.floor(times[i] / pixel_ms);
+  for (let i = 0, end = 1; i < times.length; i = end++) {
+    while (end < times.length && pixel_at(end) === pixel_at(i)) ++end;
+    if (i > 0 && times[i] - times[i - 1] > GAP_MS) rows.push([times[i - 1] + 1, ...columns.map(() => NaN)]);
+    const pairs = columns.map((values, k) => {
+      const pair = extremes(values, i, end);
+      if (pair[0] !== null) seen_ms[k] = times[end - 1];
+      return times[end - 1] - seen_ms[k] > GAP_MS ? [NaN, NaN] : pair;
+    });
+    rows.push([times[i], ...pairs.map(([first]) => first)]);
+    if (end > i + 1) rows.push([times[end - 1], ...pairs.map(([, second]) => second)]);
+  }
   return rows;
 }
 
@@ -42,6 +58,7 @@ class Chart {
   #picked = element('div', {className: 'picked', hidden: true});
   #canvas = element('div', {className: 'canvas'});
   #size = '';
+  #last = [];  // the newest value of each field in the window
   #drag_from = null;
   #hello;
   #plots;
@@ -126,7 +143,9 @@ class Chart {
   draw(history, from_ms, to_ms) {
     const [width, height] = [this.#canvas.clientWidth, this.#canvas.clientHeight];
     if (width < 40 || height < 40) return false;
-    const file = rows_of(history.between(from_ms, to_ms, this.fields));
+    const [times, ...columns] = history.between(from_ms, to_ms, this.fields);
+    this.#last = columns.map((values) => values.at(-1) ?? NaN);
+    const file = rows_of([times, ...columns], (to_ms - from_ms) / width);
     if (!file.length) return false;
     if (!this.#plot) this.#make(file);
     if (this.#size !== `${width} ${height}`) this.#plot.resize();
@@ -140,11 +159,11 @@ class Chart {
     if (!this.#plot) return;
     const {x, w} = this.#plot.getArea();
     const {pointed} = this.#plots;
-    const row = pointed === null ? this.#plot.numRows() - 1 : this.#plot.findClosestRow(x + pointed * w);
-    if (pointed === null) this.#plot.clearSelection(); else this.#plot.setSelection(row);
-    put(this.#time, pointed === null ? '' : clock_text(this.#plot.getValue(row, 0), 3));
-    this.fields.forEach((field, series) => put(this.#readout[series],
-      value_text(this.#plot.getValue(row, series + 1) ?? NaN, this.#hello.units[field])));
+    const row = pointed === null ? -1 : this.#plot.findClosestRow(x + pointed * w);
+    if (row < 0) this.#plot.clearSelection(); else this.#plot.setSelection(row);
+    put(this.#time, row < 0 ? '' : clock_text(this.#plot.getValue(row, 0), 3));
+    this.fields.forEach((field, series) => put(this.#readout[series], value_text(
+      row < 0 ? this.#last[series] : this.#plot.getValue(row, series + 1) ?? NaN, this.#hello.units[field])));
   }
 }
 
