@@ -213,7 +213,7 @@ class Sender {
     if (supply_is_missing() && !options_.json) {
       print_trouble(
           "r4: {}: the motor supply is open (relay 1 is off), so no motor turns; send R:1,On "
-          "before it\n",
+          "before it",
           text);
     }
     next_ += size;
