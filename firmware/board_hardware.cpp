@@ -16,7 +16,6 @@ constexpr Chip pwm_chips[] = {Chip::osmc_pwm, Chip::dhb12_pwm, Chip::servo_pwm};
 constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
                                          Chip::servo_pwm};
 
-// The bit of an expander line that is high, otherwise 0.
 unsigned level(Place place, bool on) {
   return place.connected() && on != place.option() ? 1U << place.number() : 0U;
 }
@@ -109,13 +108,11 @@ void BoardHardware::drive_safe() {
   for (AnalogOutputPin* pin : pins_.dac) pin->write(0);
   // Drivers forget pending writes, even if a held bus keeps their chips from being written now.
   for (ChipDriver* chip : chips_) chip->want_safe();
-  // If a held bus can be freed, the chip that held it comes last.
   const int held_at = drive_chips_safe(nowhere);
   if (held_at != nowhere && bus_.recover()) drive_chips_safe(held_at);
 }
 
-// Returns the chip at which the bus was held, all_chips for the all-call, or nowhere.
-// `held_before`: the result of the previous attempt.
+// Returns the chip at which the bus was held, all_chips or nowhere. `held_before`: the last result.
 int BoardHardware::drive_chips_safe(int held_before) {
   if (config_.wiring.has_pca9685() && held_before != all_chips &&
       Pca9685::all_off(bus_) == I2cResult::timeout) {
@@ -166,7 +163,6 @@ std::uint16_t BoardHardware::connected_bits() const {
   return bits;
 }
 
-// The values of all lines of the expander; unconnected lines are low.
 std::uint16_t BoardHardware::ports_of(const Outputs& outputs) const {
   const Place* const places = config_.wiring.places;
   unsigned ports = 0;
@@ -289,7 +285,6 @@ void BoardHardware::set_up_what_was_cut_off() {
   }
 }
 
-// True if there is new trouble, which is then latched.
 bool BoardHardware::look_for_trouble() {
   bool found = false;
   for (int i = 0; i < chip_count; ++i) {
@@ -310,9 +305,8 @@ bool BoardHardware::look_for_trouble() {
   return found;
 }
 
-// Each function that uses the bus ends with leave(). New trouble makes all outputs safe. The
-// function's last write may have undone an interrupting make_safe(), so outputs are made safe
-// again.
+// Ends each function that uses the bus. New trouble makes all outputs safe. The last write may have
+// undone an interrupting make_safe(), so outputs are made safe again.
 void BoardHardware::leave() {
   if (!interrupted_ && look_for_trouble()) {
     reset_lost_modes();

@@ -2,23 +2,20 @@
 // The R4 board's chip drivers, wired by a Wiring. A signal without a place or chip has no effect.
 //
 // Power-up: call power_up() first. It resets the PWM chips, which turns every PWM output off in any
-// mode, and leaves every output in its safe value. poll() then sets the chips up. ready() is true
-// when all chips are set up. Outputs applied earlier wait until then: no motor runs before its
-// brake works.
+// mode, and makes every output safe. poll() then sets the chips up, and ready() is true when all
+// are set up. Outputs applied earlier wait until then: no motor runs before its brake works.
 //
 // Safe state (make_safe()): steppers stopped, PWM outputs off, DAC codes and outputs 0, brakes on,
 // relays off. make_safe() may be called at any time, also in an interrupt or a fault handler during
-// a transfer. It makes at most two bounded attempts (a held bus is recovered once). A damaged or
-// unconfirmed wiring is a fault from the start.
+// a transfer. It makes at most two bounded attempts (a held bus is recovered once).
 //
 // Chip faults: the fault is latched with chip and reason, all outputs are made safe, and apply()
 // has no effect until clear_fault(). Every retry_us the bus is recovered and the chip set up again,
 // outputs off first. If a disturbance changed the modes of a PCA9685, all chips that obey the
 // general call are reset first. Until the reset, the outputs of that PCA9685 may be on.
 //
-// The reset of a chip is detected within chip_count x verify_us plus one poll; the PCA9685 are
-// verified first after a safe state. Each poll() and each apply() sends at most bus_bytes_per_poll
-// bytes; later polls send the rest. No call waits.
+// A chip's reset is detected within chip_count x verify_us plus one poll; the PCA9685 come first
+// after a safe state. poll() and apply() send at most bus_bytes_per_poll bytes each. No call waits.
 #pragma once
 
 #include <cstddef>
@@ -105,7 +102,6 @@ class BoardHardware final : public Hal {
   UltrasonicSensors& ultrasonic() { return ultrasonic_; }
 
  private:
-  // Where the bus was held, if not at a chip.
   static constexpr int nowhere = -1;
   static constexpr int all_chips = chip_count;
 

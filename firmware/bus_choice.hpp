@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Chooses the I2C bus that has the board's chips. At a start the board reads from the address that
-// all PCA9685 share, on both buses. A PCA9685 may answer only on the bus that the wiring does not
-// name. Then the board drives the chips on that bus, to keep them off, and stays in a fault. A
-// board without a PCA9685 leaves the other bus to the user.
+// Chooses the I2C bus with the board's chips: the bus of the wiring, unless a PCA9685 answers only
+// on the other bus. Then the board drives the chips on that bus, to keep them off, and stays in a
+// fault. A board without a PCA9685 leaves the other bus to the user.
 #pragma once
 
 #include <cstdint>

@@ -11,7 +11,6 @@
 namespace r4 {
 namespace firmware {
 
-// The application decides whether the outputs reach the hardware.
 struct Setpoints {
   Outputs outputs;
   std::uint16_t proximity_cm[ultrasonic_channels] = {};  // 0: no threshold

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Watches the application from outside its loop. A timer interrupt calls tick() every millisecond,
-// so the outputs become safe in time even if the loop hangs.
+// Makes the outputs safe even if the loop hangs. A timer interrupt calls tick() each millisecond.
 //     event                     detected by                        reaction
 //     the host falls silent     the link's deadline has passed     outputs safe, cause link
 //     E:STOP has arrived        stop() was called                  outputs safe, cause stop
 //     a duty hangs              5 deadlines missed in a row        outputs safe, cause watchdog
 //     a duty is often late      2 missed a second for long         outputs safe, cause watchdog
-//     a duty stays away         tick() does not return true        the port starves the hardware
-//                                                                  watchdog, which resets the board
+//     a duty stays away         tick() does not return true        the watchdog resets the board
 //     too many duties           add_duty()                         outputs safe (watchdog), reset;
 //                                                                  again after each clear, because
 //                                                                  that duty would be unwatched

@@ -20,7 +20,6 @@ struct StepperTarget {
   friend bool operator!=(const StepperTarget& a, const StepperTarget& b) { return !(a == b); }
 };
 
-// An output at rest is 0, and a brake is on.
 inline void rest(Bldc& channel) { channel.brake = true; }
 template <class Value>
 void rest(Value&) {}

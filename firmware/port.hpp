@@ -17,9 +17,8 @@ class Port {
   virtual void send(Text datagram, Priority priority, Peer peer) = 0;
   // The longest datagram the port carries: 508 on the Giga's WiFi, 1024 elsewhere.
   virtual std::size_t max_size() const = 0;
-  // `peer` is in control and keeps its number until another peer is held; everyone: no peer is in
-  // control. If a transport cannot reach everyone at once (UDP), datagrams for everyone go to
-  // `peer`.
+  // `peer`, in control, keeps its number until another peer is held; everyone: no peer is in
+  // control. UDP, which cannot reach everyone at once, sends datagrams for everyone to `peer`.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
   // Also holds `peer`, until hold(): a port may have several paths (session_paths.hpp).
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }

@@ -29,7 +29,6 @@ class Safety {
   void again() { newest_ = newest_ == INT32_MAX ? 1 : newest_ + 1; }
   // True if the cause was active.
   bool leave(SafeReason cause);
-  // E:CLEAR: ends the reported cause if it is stop, fault or watchdog.
   void clear();
 
   bool is_safe() const { return causes_ != 0; }

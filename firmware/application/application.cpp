@@ -114,8 +114,6 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   }
 }
 
-// Datagrams that arrive during a standstill wait in an interrupt's ring or in the operating system.
-// Their arrival times are unknown, but they came after the last turn.
 void Application::turn(std::uint32_t now_ms) {
   if (now_ms - turned_ms_ > standstill_ms) {
     for (PortSlot& slot : ports_) {
@@ -147,13 +145,11 @@ Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& 
   return of_host ? authentication_.verify(datagram, now_ms) : Verdict::missing;
 }
 
-// Reports a dropped datagram. True if the board must answer.
 bool Application::rejected(Verdict verdict, std::uint32_t now_ms) {
   if (observer_ != nullptr) observer_->on_rejected(now_ms, verdict);
   return authentication_.rejected(verdict);
 }
 
-// The ports keep the peers of the session's paths, even if many other peers send.
 void Application::hold_paths() {
   for (std::uint8_t i = 0; i < port_count_; ++i) {
     bool held = false;

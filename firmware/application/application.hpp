@@ -7,9 +7,8 @@
 //     ACTIVE       a host is in control and there is no cause: outputs follow the setpoints
 //     SAFE         there is a cause (safety.hpp): outputs safe; with cause `link` heartbeats only
 //
-// A session has one to four paths (session_paths.hpp), and each path gets states and heartbeats.
-// Packet numbers count per port; answers to hosts that are not in control have their own numbers.
-// Times are ms, and wrap.
+// A session has one to four paths (session_paths.hpp); each path gets states and heartbeats. Packet
+// numbers count per port; answers to hosts not in control have their own. Times are ms, and wrap.
 #pragma once
 
 #include <cstddef>
@@ -42,8 +41,7 @@ class Application {
     // Authentication::chance_size random bytes, different at each boot. Without them, a board with
     // a key obeys only a host on the board's own cable.
     const std::uint8_t* chance = nullptr;
-    // The devices must outlive the application. Set all UARTs or none. Commands for a missing
-    // device (nullptr) are refused as unknown.
+    // Must outlive the application. All UARTs or none. Commands for nullptr are refused as unknown.
     UserI2c* i2c = nullptr;
     UserUart* uarts[uart_channels] = {};
   };
@@ -57,9 +55,8 @@ class Application {
   // Makes the outputs safe and sends the first heartbeat.
   void start(std::uint32_t now_ms);
 
-  // Ignores a port that was not added. After a pause longer than standstill_ms, the datagram may
-  // have waited since the last turn of the loop (a call of receive() or poll()). A heartbeat then
-  // counts from that turn, until the port is drained or the loop has run for catch_up_ms.
+  // Ignores a port that was not added. After a pause longer than standstill_ms, datagrams may have
+  // waited: heartbeats count from the last turn of the loop, until drained() or after catch_up_ms.
   void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
   // All datagrams that arrived on `port` were handed over, so its next heartbeat has not waited.
   void drained(std::uint8_t port);
@@ -85,9 +82,7 @@ class Application {
   const SessionPaths& paths() const { return paths_; }
   const Authentication& authentication() const { return authentication_; }
 
-  // Longest time between two calls of poll(), for the interlocks.
   static constexpr std::uint32_t interlock_period_ms = 10;
-  // The guard counts a longer turn of the loop as missed.
   static constexpr std::uint32_t loop_limit_ms = 20;
   // A longer pause between two turns is a standstill. A heartbeat may count as this much newer.
   static constexpr std::uint32_t standstill_ms = 15;
@@ -97,8 +92,7 @@ class Application {
   // time is two turns of each sensor (drivers/ultrasonic.hpp), because one turn may miss an echo.
   static constexpr int proximity_hysteresis_cm = 5;
   static constexpr std::uint32_t proximity_clear_ms = 500;
-  // States include the answer to a single transfer on the user's bus for this long, selected or
-  // not.
+  // States show the answer to a single transfer on the user's bus for this long, even unselected.
   static constexpr std::uint32_t answer_shown_ms = 1000;
 
  private:
@@ -123,7 +117,6 @@ class Application {
   bool rejected(Verdict verdict, std::uint32_t now_ms);
   void tell_ports();
 
-  // application_commands.cpp
   void on_command(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   void on_group(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   bool admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
@@ -136,7 +129,6 @@ class Application {
   void bring_about(std::uint32_t now_ms);
   void emergency_stop(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
 
-  // application_devices.cpp
   Refusal carry_out_device(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void forget_uarts();
   void begin_devices(std::uint32_t now_ms);
@@ -146,7 +138,6 @@ class Application {
   void add_device_answer(FieldSet& fields, std::uint32_t t_ms) const;
   void fill_devices(State& state) const;
 
-  // application_safety.cpp
   void look_at_time(std::uint32_t now_ms);
   void look_at_stops(std::uint32_t now_ms);
   void stop_without_number(std::uint32_t now_ms);
@@ -160,7 +151,6 @@ class Application {
   void update_outputs(std::uint32_t now_ms);
   void report_state(std::uint32_t now_ms);
 
-  // application_sending.cpp
   static std::uint32_t heartbeat_time(std::uint32_t now_ms);
   void send_heartbeats(std::uint32_t now_ms);
   void answer_heartbeat(Source to, std::uint32_t now_ms);
@@ -217,8 +207,7 @@ class Application {
   bool stop_of_a_key_ = false;
   std::uint32_t stop_number_ = 0;
   HostId stop_from_;
-  // Stops that the guard received, the number of their unread datagrams, and the time of the
-  // newest.
+  // Stops that the guard received, their unread datagrams, and the time of the newest.
   std::uint32_t stops_heard_ = 0;
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;

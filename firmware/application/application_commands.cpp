@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Command datagrams: admission, execution and effects.
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/command_group.hpp"
 #include "../../protocol/messages/device_command.hpp"
@@ -8,8 +7,7 @@
 namespace r4 {
 namespace firmware {
 
-// True if the sender and the time allow a command datagram. Otherwise the datagram is answered or
-// dropped. `refusal`: the result of parsing; `at`: the command of a group that caused it.
+// False if the datagram was answered or dropped. `at`: the group's command that caused `refusal`.
 bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
                         std::uint8_t at, std::uint32_t now_ms) {
   if (verdict != Verdict::authentic) {
@@ -84,7 +82,6 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   execute(datagram.pnum(), command, now_ms);
 }
 
-// Several commands in one datagram: all change the setpoints, then the hardware is updated once.
 void Application::on_group(Source from, const Datagram& datagram, Verdict verdict,
                            std::uint32_t now_ms) {
   CommandGroup group;
@@ -187,10 +184,9 @@ void Application::bring_about(std::uint32_t now_ms) {
   report_state(now_ms);
 }
 
-// A stop of the controlling host uses up its number only if the stop is authentic and the number is
+// A stop of the controlling host uses up its number only if the stop is authentic and its number is
 // one of the next. Otherwise CMD would confirm a command that was not executed. Another program at
-// the host's peer (a bus, or a shared port) has random numbers, which must not replace the host's
-// numbers.
+// the host's peer (a bus, or a shared port) has random numbers, which must not replace the host's.
 void Application::emergency_stop(Source from, const Datagram& datagram, Verdict verdict,
                                  std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);
@@ -217,7 +213,6 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
     link_.executed(datagram.pnum());
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
-  // Notify all hosts once, and the sender each time.
   if (!repeated) send_heartbeats(now_ms);
   if (repeated || !owner) answer_heartbeat(from, now_ms);
 }

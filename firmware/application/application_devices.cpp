@@ -18,7 +18,6 @@ Refusal Application::carry_out_device(std::uint32_t pnum, const Command& command
   return i2c_->ask(pnum, command) ? Refusal::none : Refusal::full;
 }
 
-// A UART that is switched off counts as a missing channel.
 Refusal Application::write_uart(const Command& command) {
   UserUart* const uart = uarts_[command.channel - 1];
   if (uart == nullptr) return Refusal::unknown;
@@ -29,7 +28,6 @@ Refusal Application::write_uart(const Command& command) {
   return uart->write(bytes, size) ? Refusal::none : Refusal::full;
 }
 
-// Drops writes that have not begun, because they may move something.
 void Application::drop_device_writes() {
   if (i2c_ != nullptr) i2c_->drop_write();
   for (UserUart* uart : uarts_) {
@@ -37,14 +35,12 @@ void Application::drop_device_writes() {
   }
 }
 
-// Bytes that arrived while no host listened are outdated.
 void Application::forget_uarts() {
   for (UserUart* uart : uarts_) {
     if (uart != nullptr) uart->forget();
   }
 }
 
-// A session begins with the readings that are settings, and without data of the previous session.
 void Application::begin_devices(std::uint32_t now_ms) {
   has_answer_ = false;
   for (UserUart* uart : uarts_) {

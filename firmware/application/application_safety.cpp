@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Entering and leaving the safe state, and the one place where outputs change.
 #include "application.hpp"
 
 namespace r4 {
 namespace firmware {
 
-// Handles a silent host, and a cause that the guard found while the loop was busy.
 void Application::look_at_time(std::uint32_t now_ms) {
   bool lost = link_.poll(now_ms);
   if (guard_.tripped()) {
@@ -54,9 +52,8 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   report_state(now_ms);
 }
 
-// A host must not clear a cause that began while E:CLEAR was under way, so E:CLEAR names the newest
-// cause. An E:CLEAR without a number must arrive at least the timeout after the cause, because
-// older datagrams are not delayed for longer. Without a latched cause, every E:CLEAR is accepted.
+// An E:CLEAR without a number must arrive at least the timeout after the cause, because older
+// datagrams are not delayed for longer. Without a latched cause, every E:CLEAR is accepted.
 Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
                                  std::uint32_t now_ms) const {
   if (unread_stops_ != 0) return Refusal::stale;  // their numbers are unknown to the sender
@@ -79,7 +76,6 @@ bool Application::any_threshold() const {
   return false;
 }
 
-// If a sensor with a threshold does not answer, it counts as an obstacle.
 bool Application::obstacle() const {
   const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
   for (int i = 0; i < ultrasonic_channels; ++i) {
@@ -108,7 +104,6 @@ void Application::check_interlocks(std::uint32_t now_ms) {
   }
 }
 
-// Sets how long the guard leaves the outputs live without a heartbeat.
 void Application::expect_host() {
   if (outputs_live_) {
     guard_.arm(link_.deadline_ms());
@@ -117,7 +112,6 @@ void Application::expect_host() {
   }
 }
 
-// The one place where outputs change: the setpoints if the board is ACTIVE, otherwise safe.
 void Application::update_outputs(std::uint32_t now_ms) {
   static const Outputs off;
   const bool live = state() == BoardState::active;

@@ -51,13 +51,11 @@ std::uint32_t& Application::number_for(Source to) {
   return shared ? ports_[to.port].next_pnum : ports_[to.port].aside_pnum;
 }
 
-// True if datagrams for everyone on its port reach the watcher.
 bool Application::reaches(Source watcher) const {
   return audience(watcher.port) == everyone && ports_[watcher.port].port->reaches(watcher.peer);
 }
 
-// True if the watcher receives all datagrams of its port, and so shares the port's numbers. Never
-// true in CONNECTING.
+// True if the watcher receives all datagrams of its port, and so shares the port's numbers.
 bool Application::hears_all(Source watcher) const {
   return link_.state() != BoardLinkState::connecting && reaches(watcher);
 }
@@ -216,7 +214,6 @@ void Application::send_states(std::uint32_t now_ms) {
   }
 }
 
-// One state, in as many datagrams of the same T as the port's limit requires.
 void Application::send_state(Source to, std::uint32_t& pnum, FieldSet fields, const State& state,
                              std::uint32_t t_ms) {
   char buffer[max_datagram];

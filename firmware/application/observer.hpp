@@ -12,7 +12,6 @@
 namespace r4 {
 namespace firmware {
 
-// The states of a board as docs/reference/safety.md names them.
 enum class BoardState : std::uint8_t { connecting, active, safe };
 
 const char* to_text(BoardState state);
@@ -23,7 +22,6 @@ class Observer {
   virtual void on_outputs(std::uint32_t t_ms, const Outputs& outputs) = 0;
   virtual void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) = 0;
   virtual void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) = 0;
-  // A heartbeat or command was dropped: its signature is wrong or missing.
   virtual void on_rejected(std::uint32_t t_ms, Verdict verdict) = 0;
   virtual void on_path(std::uint32_t t_ms, Source path, bool joined) {
     static_cast<void>(t_ms);

@@ -152,7 +152,6 @@ void UserI2c::end_reading(int slot, I2cOutcome outcome) {
   std::memcpy(reading.data.bytes, received_, reading.data.size);
 }
 
-// A scan probes one address after the other. An address without answer is not an error.
 void UserI2c::end_scan_step(I2cOutcome outcome) {
   if (outcome == I2cOutcome::bus_stuck) return answer(outcome);
   if (outcome == I2cOutcome::done) found_.bytes[found_.size++] = address_;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus, which is not the bus of the board's chips (docs/how-to/devices.md). No call
-// waits: poll() begins a transfer that is due, and checks if the current transfer has ended.
+// The user's I2C bus, separate from the board's chips (docs/how-to/devices.md). No call waits.
 //            begins a transfer              it has ended
 //     idle --------------------> transfer ----------------> idle
 //      ^                            | lost, or not ended after transfer_limit_ms
@@ -11,9 +10,8 @@
 //      |       free_after_ms        v
 //      +- - - - - - - - - - - -   held        every request fails at once
 //
-// Single transfers have priority over readings, and readings over the next address of a scan. Due
-// readings take turns. A reading whose previous transfer is under way is skipped. Times are ms, and
-// wrap.
+// Single transfers go before readings, and readings before the next address of a scan. Due readings
+// take turns. A reading whose previous transfer is under way is skipped. Times are ms, and wrap.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +31,7 @@ class UserI2c {
   bool ask(std::uint32_t pnum, const Command& command);
   // Slots count from 1; a poll that is not on ends the slot. Discards the slot's last reading.
   void poll_slot(int slot, const I2cPoll& poll, std::uint32_t now_ms);
-  // Cancels a write that has not begun, because the board is safe.
+  // The board is safe: cancels a write that has not begun, because it may move something.
   void drop_write();
   // A session begins: cancels requests and answers of the previous session.
   void drop_all();
@@ -51,8 +49,7 @@ class UserI2c {
     return answered;
   }
 
-  // Longer than a transfer of 32 bytes each way at 100 kHz, and than SMBus lets a device stretch
-  // the clock.
+  // Longer than 32 bytes each way at 100 kHz, and than SMBus lets a device stretch the clock.
   static constexpr std::uint32_t transfer_limit_ms = 35;
   static constexpr std::uint32_t free_after_ms = 100;  // until a held bus is clocked again
 

@@ -8,8 +8,7 @@
 namespace r4 {
 namespace firmware {
 
-// Sends `out`, then reads `in` after a repeated START. Either may be empty. With both empty, the
-// transfer tests whether a device answers.
+// Sends `out`, then reads `in` after a repeated START. Either may be empty; both empty: a probe.
 struct UserTransfer {
   std::uint8_t address = 0;
   const std::uint8_t* out = nullptr;

@@ -7,8 +7,7 @@
 //     a state              |--------- new ------------|
 //     the next             |---- again ----|--- new (26) ---|          position 126, 64 bytes
 //
-// If at most 32 bytes arrive in a period, a single lost state loses no bytes. A larger loss is
-// visible: the next state's position is after the end of the last state.
+// With up to 32 bytes a period, one lost state loses no bytes. A larger loss shows in the position.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +27,6 @@ class UserUart {
   void set_up(const UartMode& mode);
   bool on() const { return mode_.on(); }
   bool write(const std::uint8_t* bytes, std::size_t size) { return port_.send(bytes, size); }
-  // Drops queued bytes, because the board is safe.
   void drop_writes() { port_.drop(); }
   // A session begins or resumes: drops bytes received before.
   void forget();
@@ -39,8 +37,7 @@ class UserUart {
   void next_state();
   void tell(UartBytes& out) const;
 
-  // Holds a burst of 530 bytes at 115200 baud: meanwhile 100 states per second carry over half of
-  // the bytes. Bytes beyond the backlog are lost and counted.
+  // Holds a burst of 530 bytes at 115200 baud and 100 states per second. More is lost and counted.
   static constexpr std::uint32_t capacity = 344;
   static constexpr std::uint32_t backlog = capacity - uart_max_bytes;
   static constexpr std::size_t bytes_a_turn = 64;

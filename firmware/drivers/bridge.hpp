@@ -27,7 +27,6 @@ class Bridge {
     inverted_ = direction.option();
     chip.pair(first_, second_);
   }
-  // Takes effect at the chip's next write.
   void set(Drive drive) {
     if (chip_ == nullptr) return;
     const bool forward = (drive.direction == Direction::forward) != inverted_;

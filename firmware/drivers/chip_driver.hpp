@@ -34,7 +34,6 @@ class BusBudget {
     left_ -= bytes;
     return true;
   }
-  // True if a transfer had to wait for the next poll.
   bool exhausted() const { return exhausted_; }
 
  private:

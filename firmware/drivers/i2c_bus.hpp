@@ -39,8 +39,7 @@ class I2cBus {
   virtual I2cResult write_read(std::uint8_t address, const std::uint8_t* out, std::size_t out_size,
                                std::uint8_t* in, std::size_t in_size) = 0;
   // Nine clocks and a STOP (UM10204 3.1.16): a chip cut off in mid-byte releases SDA. True if both
-  // lines are high afterwards. May interrupt a transfer, even in a fault handler; the transfer then
-  // returns timeout.
+  // lines are high. May interrupt a transfer (which returns timeout), also in a fault handler.
   virtual bool recover() = 0;
 
  protected:

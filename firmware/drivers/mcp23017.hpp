@@ -7,10 +7,9 @@
 //     0A 0B IOCON    BANK 80, SEQOP 20 …; reset 0                  3.5.6
 //     14 15 OLAT     output latches; reset 0                       3.5.11
 //
-// Set-up: first the latches with the safe values, then the directions, so that no pin is driven to
-// an unintended value. Until then the pins float, so each circuit needs a pull resistor to its safe
-// level. Pins change at the acknowledge of their port's byte. One transfer writes all changed
-// latches. Pins that are not outputs of the board stay inputs.
+// Set-up: the latches with the safe values, then the directions, so that no pin is driven wrongly.
+// Until then the pins float: each circuit needs a pull resistor to its safe level. Pins change at
+// the acknowledge of their port's byte. Pins that are not outputs of the board stay inputs.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +24,6 @@ class Mcp23017 final : public ChipDriver {
   // Bits 0-7 are port A, bits 8-15 port B.
   Mcp23017(I2cBus& bus, std::uint8_t address, std::uint16_t outputs, std::uint16_t safe);
 
-  // Takes effect at the next write.
   void set_ports(std::uint16_t ports);
 
   void want_safe() override;

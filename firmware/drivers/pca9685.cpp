@@ -179,8 +179,7 @@ void Pca9685::take_differing(int channel, Registers& found) const {
   }
 }
 
-// Collects changed channels with their partners, the lowest first, while their registers are near
-// each other and fit into `most` bytes. Returns the channels, one bit each.
+// Collects changed channels and partners while their registers are near and fit into `most` bytes.
 std::uint16_t Pca9685::next_burst(std::size_t most, Registers& burst) {
   std::uint16_t taken = 0;
   for (int i = 0; changed_ >> i != 0; ++i) {

@@ -17,10 +17,9 @@
 // registers only between pairs of channels (pair()), so the two lines of a motor change together.
 //
 // The chip has no timeout: it keeps driving when the microcontroller fails. all_off() makes all
-// three chips safe in three bytes, but a disturbance can set bits that defeat it. INVRT turns "off"
-// into "on", and with EXTCLK the outputs wait for a missing clock. Only a reset clears EXTCLK. So
-// the modes are read back after a safe state. If EXTCLK or MODE2 is not as written, lost_mode()
-// requests reset_all().
+// chips safe in three bytes, but a disturbance can defeat it. INVRT turns "off" into "on", and with
+// EXTCLK the outputs wait for a missing clock. Only a reset clears EXTCLK. So the modes are read
+// back after a safe state. If EXTCLK or MODE2 is not as written, lost_mode() requests reset_all().
 #pragma once
 
 #include <cstddef>

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A stepper motor driver with step and direction inputs (Microstep M542). It steps at rising edges
-// of pulses of at least 2.5 us. The direction must be set at least 5 us before.
+// Drives a Microstep M542: steps at rising edges, pulse >= 2.5 us, direction >= 5 us before.
 //
-// Call tick() tick_hz times per second, at least 40 kHz for the board's 20000 steps per second. A
-// pulse lasts one tick, and a new direction gets a tick before the next step, so a tick must be 5
-// us or longer. The remainder of each step is kept, so the speed is exact over any time.
-//
-// tick() may run in an interrupt, the other calls in the code that it interrupts, on one core.
-// Positions are steps and wrap at 32 bits.
+// Call tick() tick_hz times per second, at least 40 kHz for the board's 20000 steps/s. A pulse
+// lasts one tick, and a new direction gets a tick before the next step, so a tick is at least 5 us.
+// Remainders of steps are kept, so the speed is exact. tick() may run in an interrupt, other calls
+// in the code that it interrupts, on one core. Positions are steps, and wrap at 32 bits.
 #pragma once
 
 #include <atomic>
@@ -21,7 +18,6 @@ namespace firmware {
 class Stepper {
  public:
   // Speeds are limited to `speed_limit` steps per second and to half the tick rate.
-  // `low_is_forward`: the level of the direction pin.
   Stepper(OutputPin& step, OutputPin& direction, std::int32_t tick_hz, std::int32_t speed_limit,
           bool low_is_forward = false)
       : step_(step),
@@ -34,7 +30,6 @@ class Stepper {
   void go(std::int32_t position, std::int32_t speed);
   // A pulse that has begun ends with the next tick.
   void stop() { speed_.store(0, std::memory_order_relaxed); }
-  // Sets the position to 0 and stops.
   void zero();
   void tick();
 

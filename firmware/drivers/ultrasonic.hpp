@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Up to four ultrasonic sensors HC-SR04, in turn so that no sensor receives another sensor's burst.
-// Data sheet: trigger at least 10 us, echo pulse of 58 us per centimetre, about 38 ms without echo,
-// at least 60 ms between triggers.
+// Up to four HC-SR04 sensors, in turn so that no sensor receives another's burst. Data sheet:
+// trigger at least 10 us, echo 58 us/cm, about 38 ms without echo, at least 60 ms between triggers.
 //           poll()                 10 us later           echo fell, or 40 ms passed
 //     waiting ----------> trigger ------------> listening ----------> done
 //        ^                                                              |
@@ -48,7 +47,6 @@ class UltrasonicSensors {
   // Centimetres, 1-400; 0: nothing in range, or unknown.
   std::uint16_t distance_cm(int sensor) const { return distance_cm_[sensor]; }
   EchoResult result(int sensor) const { return result_[sensor]; }
-  // True if distance_cm() is a measured distance, or 0 because nothing is in range.
   bool sees(int sensor) const {
     return result_[sensor] == EchoResult::distance || result_[sensor] == EchoResult::no_echo;
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Passes bytes from one context to another; one of the two may be an interrupt handler. Lock-free,
-// because each index has one writer.
+// Passes bytes between two contexts, also interrupts. Lock-free, because each index has one writer.
 #pragma once
 
 #include <atomic>

@@ -2,8 +2,7 @@
 // The send queue of a serial port: it never waits, and the newest state replaces older states. Each
 // line enters the ring whole or not at all. A state without room waits outside the ring, where a
 // newer state replaces it. The last part of the ring is for heartbeats and answers. If no byte
-// leaves for `stale_ms` (the host does not read), lines not begun are dropped and only the newest
-// state is kept.
+// leaves for `stale_ms`, lines not begun are dropped and only the newest state is kept.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CRC-32 of a datagram (paper section 4.1), as in zlib: reflected polynomial 0xEDB88320, initial
-// value and final XOR all ones.
+// CRC-32 (paper section 4.1) as in zlib: reflected 0xEDB88320; initial value, final XOR: all ones.
 #pragma once
 
 #include <cstddef>

@@ -136,7 +136,6 @@ Field Datagram::find(Text name) const {
   return Field();
 }
 
-// The values of the field whose colon is at `bit` of word `word`.
 Text Datagram::values_at(std::size_t word, std::uint64_t bit) const {
   const char* const colon = fields_.begin() + word * 64 + lowest_bit(bit);
   std::uint64_t later = ends_[word] & ~(bit | (bit - 1));

@@ -47,10 +47,9 @@ struct Separators {
 constexpr std::size_t separators_block = 64;
 Separators separators(Text block);
 
-// Marks in `ends` the colon after each name and the semicolon after each field. Marks in
-// `short_names` the colons one, three or four bytes after a field's beginning. Each word has one
-// bit for each of 64 bytes. False if the fields break the grammar. The time does not depend on the
-// number of fields.
+// Marks in `ends` the colon after each name and the semicolon after each field; in `short_names`
+// the colons one, three or four bytes after a field's beginning. A word has a bit for each of 64
+// bytes. False if the fields break the grammar. The time does not depend on their number.
 bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names);
 
 }  // namespace r4

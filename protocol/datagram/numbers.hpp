@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers from text and to text; all code uses these functions. The whole text must be the number,
-// without blanks and '+'. If the text is not valid, a reader returns false and, unless noted,
-// leaves `out` unchanged.
+// Numbers from text and to text, for all code. The whole text must be the number, without blanks
+// and '+'. If it is not valid, a reader returns false and, unless noted, leaves `out` unchanged.
 #pragma once
 
 #include <cstddef>

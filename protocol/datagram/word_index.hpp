@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds a word in a table by its hash. The compiler builds the index. If the table has a word
-// twice, find() returns the first entry.
+// Finds words by their hash; the compiler builds the index. Of equal words, the first is found.
 #pragma once
 
 #include <cstddef>

@@ -15,11 +15,9 @@ constexpr bool reached(std::uint32_t now, std::uint32_t at) {
   return static_cast<std::int32_t>(now - at) >= 0;
 }
 
-// keep_near() moves an older time to this distance.
 constexpr std::uint32_t long_ago = std::uint32_t{1} << 30;
 
-// Keeps a past time within long_ago of `now`, so that comparisons stay right. Does not change a
-// future time. Call it more often than every 12 days.
+// Keeps past times within long_ago of `now`: comparisons stay right. Call at least every 12 days.
 inline void keep_near(std::uint32_t& past, std::uint32_t now) {
   if (newer(now - long_ago, past)) past = now - long_ago;
 }

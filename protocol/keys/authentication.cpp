@@ -82,8 +82,6 @@ Blake2sKey signing_key(const Key& key) {
   return Blake2sKey(tag_bytes, derived, sizeof derived);
 }
 
-// --- the board's end
-
 Authentication::Authentication(const std::uint8_t* chance) : has_chance_(chance != nullptr) {
   if (has_chance_) chance_ = Blake2sKey(nonce_size / 2, chance, chance_size);
 }
@@ -189,8 +187,6 @@ bool Authentication::rejected(Verdict verdict) {
   ++rejections_[static_cast<std::size_t>(verdict)];
   return verdict != Verdict::replayed && verdict != Verdict::old;
 }
-
-// --- the host's end
 
 bool Signer::on_nonce(Text nonce) {
   if (has_nonce_ && nonce == Text(nonce_, nonce_size)) return false;

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Proves that a datagram is from a host with the board's key, is recent and was not received before
-// (docs/reference/protocol.md "Authentication"). Only hosts sign.
-// The board sends a nonce in its heartbeats, 64 random bits as `AN:<16 hex digits>;`. The host
-// signs with the last field of its datagrams:
+// (docs/reference/protocol.md "Authentication"). Only hosts sign. The board sends a nonce in its
+// heartbeats: 64 random bits, `AN:<16 hex digits>;`. The host's last field is the signature:
 //     A:<key id>,<counter>,<board T>,<tag>;
 // The tag is 64 bits of keyed BLAKE2s over "R4A1", the digits of AN and every byte of the datagram
-// before the tag. It is 11 characters of base64url without padding (RFC 4648, 5).
-// Datagrams are not encrypted, and a board's datagrams are not signed.
+// before the tag. It is 11 characters of base64url without padding (RFC 4648, 5). No encryption.
 #pragma once
 
 #include <cstddef>
@@ -60,8 +58,7 @@ class Authentication {
   Text nonce() const { return Text(nonce_, has_nonce_ ? nonce_size : 0); }
   // Takes another nonce: earlier signatures become invalid, and counters restart.
   void renew();
-  // For a bridge: takes its board's nonce. A new nonce restarts the counters. With an empty nonce,
-  // no datagram is authentic.
+  // For a bridge: takes its board's nonce. A new nonce restarts counters; empty: none is authentic.
   void follow(Text nonce);
 
   bool has_chance() const { return has_chance_; }
@@ -104,7 +101,6 @@ class Authentication {
   std::uint32_t rejections_[verdict_count] = {};
 };
 
-// Signs for one board.
 class Signer {
  public:
   explicit Signer(const Key& key) : key_(signing_key(key)), id_(key.id) {}
@@ -115,9 +111,8 @@ class Signer {
   void on_board_time(std::uint32_t t_ms, std::uint32_t now_ms);
   bool ready() const { return has_nonce_; }
 
-  // Writes the field A after all other fields; call finish() of the writer next. Call only while
-  // ready(). `counter_floor`, in microseconds since 1970, is the least counter, so that a restarted
-  // host continues above its used counters.
+  // Writes the field A after all other fields; call the writer's finish() next. Only while ready().
+  // `counter_floor`, in us since 1970: the least counter, so that a restarted host continues above.
   void sign(DatagramWriter& writer, std::uint64_t counter_floor, std::uint32_t now_ms);
 
  private:

@@ -6,8 +6,7 @@
 // If one key authenticates many messages, Blake2sKey processes the key once:
 //     const Blake2sKey prepared(8, key, sizeof key);
 //     Blake2s code(prepared);           // for a message of at least one byte
-// Messages have up to 2^32 - 1 bytes, including the key's 64-byte block. No call fails. The time
-// depends only on the sizes, never on the bytes.
+// Messages have up to 2^32 - 1 bytes, with the key's 64. The time depends only on the sizes.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +20,6 @@ constexpr std::size_t blake2s_max_digest = 32;
 constexpr std::size_t blake2s_max_key = 32;
 constexpr std::size_t blake2s_block = 64;
 
-// The state of the hash after the key's block.
 class Blake2sKey {
  public:
   Blake2sKey() = default;

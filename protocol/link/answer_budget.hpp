@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Limits long answers to unproven peers: 50 a second on average, and 16 at once. The source of a
-// datagram may be forged, and the board must not flood another device. Answers about as long as
-// their request need no budget. Times are in ms, and wrap.
+// datagram may be forged, and the board must not flood another device. Times are ms, and wrap.
 #pragma once
 
 #include <cstdint>

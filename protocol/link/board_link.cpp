@@ -3,8 +3,6 @@
 
 namespace r4 {
 
-// --- heartbeats of hosts
-
 bool BoardLink::is_echo(std::uint64_t t) const {
   for (int i = 0; t != 0 && i < sent_used_; ++i) {
     if (sent_[i] == t) return true;
@@ -75,8 +73,6 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
   return HeartbeatEffect::new_session;
 }
 
-// --- sessions
-
 void BoardLink::begin_session(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   has_session_ = true;
   host_ = heartbeat.host;
@@ -99,8 +95,7 @@ void BoardLink::resume(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   feed(heartbeat, at_ms);
 }
 
-// `at_ms`: the earliest possible arrival, so the age of an overtaken command is never
-// underestimated. A command that arrived later in the same backlog has a newer number.
+// `at_ms`: the earliest possible arrival, so that no overtaken command's age is underestimated.
 void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   fed_ms_ = at_ms;
   const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
@@ -110,8 +105,7 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   if (!heartbeat.has_pnum) return;
   newest_heartbeat_ = heartbeat.pnum;
   // The marks cover late_limit_ms at any heartbeat rate. A heartbeat between two marks counts as
-  // arrived at the earlier mark. When the oldest mark is dropped, the next mark is already past the
-  // limit.
+  // arrived at the earlier. When the oldest mark is dropped, the next is already past the limit.
   constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1) + 1;
   if (marks_used_ != 0 && at_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
     marks_[marks_used_ - 1].pnum = heartbeat.pnum;
@@ -149,8 +143,6 @@ bool BoardLink::first_heartbeat(HostId host, std::uint32_t& pnum) const {
   pnum = first_heartbeat_;
   return is_session_of(host) && has_heartbeat_pnum_;
 }
-
-// --- commands
 
 bool BoardLink::in_window(std::uint32_t pnum) const {
   return !has_baseline_ || (newer(pnum, newest_) && pnum - newest_ <= command_window);
@@ -212,10 +204,7 @@ void BoardLink::executed(std::uint32_t pnum) {
   if (behind == 0) last_executed_ = pnum;
 }
 
-// --- the board's own heartbeats
-
-// True while a host with a session id has not echoed the newest heartbeat. A lost heartbeat must
-// not make the host's echoes stale.
+// A lost heartbeat must not make the echoes of a host with a session id stale.
 bool BoardLink::lacks_echo() const {
   return has_owner() && host_.sid != no_session && newer(last_sent_ms_, newest_echo_ms_);
 }

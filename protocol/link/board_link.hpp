@@ -64,9 +64,8 @@ class BoardLink {
   explicit BoardLink(Timing timing) : timing_(timing) {}
   void set_timing(Timing timing) { timing_ = timing; }
 
-  // `t` is 0 if the heartbeat has no T. The heartbeat arrived at most `waited_ms` before this call,
-  // and counts from the earliest possible arrival. A heartbeat that may have waited for the timeout
-  // is stale.
+  // `t` is 0 if the heartbeat has no T. It arrived at most `waited_ms` before this call, and counts
+  // from the earliest possible arrival. A heartbeat that may have waited for the timeout is stale.
   struct HostHeartbeat {
     HostId host;
     bool has_pnum = false;
@@ -92,8 +91,7 @@ class BoardLink {
   bool poll(std::uint32_t now_ms);
   // Every path of the session is lost. True if a host was in control: ACTIVE -> LOST.
   bool lose(std::uint32_t now_ms);
-  // The host leaves: ACTIVE -> LOST. The session ids of the last left_memory hosts that left cannot
-  // begin a session.
+  // The host leaves: ACTIVE -> LOST. The last left_memory session ids that left are refused.
   void leave(std::uint32_t now_ms);
 
   // The board's own heartbeats are due at each interval, every echo_retry_ms while an echo is

@@ -43,8 +43,7 @@ class HostLink {
   void on_heard(std::uint32_t now_ms);
   // The board reports that it is booting, so it has no session.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
-  // The board has restarted, or the host's clock stood still. A new session is needed unless the
-  // board reported its boot (on_booting()).
+  // The board restarted, or the host's clock stood still: a new session, unless on_booting() came.
   void on_restart();
 
   // The host's machine slept: the board counts as restarted, and a new session is needed.
@@ -76,15 +75,13 @@ class HostLink {
 
   std::uint32_t take_pnum() { return next_pnum_++; }
   std::uint32_t last_pnum() const { return next_pnum_ - 1; }
-  // True if this number was taken in this session.
   bool is_taken(std::uint32_t pnum) const { return pnum - first_pnum_ < next_pnum_ - first_pnum_; }
 
   // Milliseconds until poll() or heartbeat_due() may return true; 0 is now.
   std::uint32_t due_in(std::uint32_t now_ms) const;
 
   HostLinkState state() const { return state_; }
-  // True if the host has echoed a T of this boot. Before that, the board executes no command of
-  // this host.
+  // True if the host has echoed a T of this boot. Before, the board executes none of its commands.
   bool echoed() const { return echoed_; }
   std::uint32_t restarts() const { return restarts_; }
   SafeReason reason() const { return reason_; }

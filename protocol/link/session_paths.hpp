@@ -3,9 +3,8 @@
 //     unknown -- heartbeat of the session with a fresh echo --> path
 //     path    -- silent for the timeout, or its port down ----> unknown
 // The echo proves a path: its sender has received a heartbeat of the board, and has the session's
-// id. If the last path is silent, it is not removed: the link is lost.
-// Counts the host's packet numbers: lost over all paths, repeated on the same path. All times are
-// the board's clock in ms, which wraps.
+// id. If the last path is silent, it is not removed: the link is lost. Counts the host's packet
+// numbers: lost over all paths, repeated on the same path. Times are the board's ms, and wrap.
 #pragma once
 
 #include <cstdint>

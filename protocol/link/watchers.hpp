@@ -6,8 +6,7 @@
 //
 // The board streams to a source only after the source has echoed a random token, so a forged source
 // cannot make the board flood another device. The board's clock cannot be the token, because any
-// peer can get the time. Answers with a token are limited. Times are ms of the board's clock, and
-// wrap.
+// peer can get the time. Answers with a token are limited. Times are the board's ms, and wrap.
 #pragma once
 
 #include <cstdint>

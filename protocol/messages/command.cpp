@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads, checks and writes commands by their rows in include/r4link/tables/commands.hpp.
 #include "r4link/command.hpp"
 
 #include "../datagram/numbers.hpp"

@@ -13,7 +13,6 @@ namespace r4 {
 
 constexpr Text group_capability("group");
 
-// The rules for the commands of a group, the same at both ends.
 class GroupRules {
  public:
   // Refusal::none if `command`, valid by itself, may be added. Refusal::format if the group is full

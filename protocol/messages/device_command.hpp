@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Commands for connected devices: X, the I2C bus, UARTs and DAC (docs/reference/protocol.md). Bytes
-// are written as x and two hexadecimal digits each: "x3B00". The x distinguishes bytes from
-// numbers. "x" alone is not valid.
+// Commands for connected devices: X (docs/reference/protocol.md). Bytes are written as x and two
+// hexadecimal digits each: "x3B00". The x distinguishes bytes from numbers. "x" alone is not valid.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +35,6 @@ inline bool operator==(const UartMode& a, const UartMode& b) {
 }
 inline bool operator!=(const UartMode& a, const UartMode& b) { return !(a == b); }
 
-// True if the command controls or reads the user's devices.
 constexpr bool is_device_command(CommandKind kind) {
   return kind >= CommandKind::i2c_write && kind <= CommandKind::i2c_poll_off;
 }

@@ -16,7 +16,6 @@ namespace r4 {
 bool asks_to_watch(const Datagram& datagram);
 
 // `H:R4-ROS2;PNum:…;T:…;`, then as needed `SAFE:n;`, `CAUSE:n;`, `STOP:n;` and `AN:<nonce>;`
-// (authentication.hpp).
 Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
                            std::uint32_t t_ms, const SafeReport& safe, Text nonce = Text());
 // The reason in heartbeat_report(); none if the field SAFE is missing.
@@ -25,12 +24,10 @@ SafeReason heartbeat_reason(const Datagram& datagram);
 Text heartbeat_nonce(const Datagram& datagram);
 void write_nack(DatagramWriter& writer, const Nack& nack);
 
-// Firmware functions of every board: E:LEAVE, and watching by W.
+// Firmware functions of every board: E:LEAVE and W. With hardware: X, X:UART, X:DAC and GPIO.
 constexpr Text leave_capability("leave");
 constexpr Text watch_capability("watch");
-// An I2C bus for the user: X.
 constexpr Text i2c_capability("i2c");
-// UARTs: X:UART. A DAC and spare inputs: X:DAC, GPIO.
 constexpr Text uart_capability("uart");
 constexpr Text dac_capability("dac");
 // True if `word` is in `capabilities`, whose words are separated by '+'.

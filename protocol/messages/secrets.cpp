@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds the secret of a setting (settings.hpp), and removes secrets (r4link/messages/message.hpp).
 #include <cstring>
 
 #include "../datagram/crc32.hpp"

@@ -2,8 +2,7 @@
 // The settings of one board at its site (r4link/tables/settings.hpp; docs/reference/protocol.md,
 // section 3). Only a host on the board's own cable may change them (Port::may_configure()). In a
 // name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 a percent
-// sign, %6Fff the network that is called "off". Node and wiring take effect at the board's next
-// start, all other settings at once.
+// sign, %6Fff the network "off". Node and wiring take effect at the next start, the others at once.
 #pragma once
 
 #include <cstddef>
@@ -52,7 +51,6 @@ constexpr std::size_t board_id_max = 64;
 bool is_board_id(Text text);
 
 bool is_site_setting(Text key);
-// True for `password` and `key`, whose values are secret.
 bool is_secret_setting(Text key);
 
 // `number`: which key of a setting with several keys, from 1. `row` is null for an unknown key.

@@ -88,8 +88,7 @@ Text next_value(Text& rest) {
   return value;
 }
 
-// The last value is the whole rest, so a surplus value leaves a comma, and a missing value leaves
-// nothing. The parser refuses both.
+// A surplus value leaves a comma in `rest`, a missing value nothing; the parser refuses both.
 bool parse_drive(Text rest, Drive& out) {
   return parse_into(next_value(rest), pwm_max, out.pwm) && parse_into(rest, 1, out.direction);
 }
@@ -103,7 +102,6 @@ bool parse_fault(Text rest, ChipFault& out) {
   return parse_into(next_value(rest), 0x7F, out.address) && parse_into(rest, 0xFF, out.trouble);
 }
 
-// `text`: the field's values. The number parsers refuse a comma.
 bool parse_entry(Text text, const Entry& entry, State& state) {
   switch (entry.form) {
     case Form::volts:

@@ -10,8 +10,7 @@ namespace r4 {
 
 void write_field(DatagramWriter& writer, StateField field, const State& state);
 
-// The value of SAFE. An unknown number, from a newer board, is a fault. False if it is not a
-// number.
+// The value of SAFE. An unknown number, from a newer board, is a fault. False if not a number.
 bool parse_safe_reason(Text text, SafeReason& out);
 
 }  // namespace r4

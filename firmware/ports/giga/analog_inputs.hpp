@@ -2,8 +2,7 @@
 // Converts the connected analog inputs in turn, one per poll; unconnected inputs read 0. From the
 // loop only. The core sets up pins and converter. Then this class uses the registers of ADC1
 // (RM0399, chapter ADC), and never waits. The core would wait up to 10 ms for a conversion, and end
-// the boot if the converter does not switch on. With this class a dead converter reads 0, and
-// motors can be driven.
+// the boot if the converter does not switch on.
 #pragma once
 
 #include <cstdint>
@@ -41,8 +40,7 @@ class AnalogInputs {
     }
   }
 
-  // Takes the finished conversion and starts the next. If the converter stops, all inputs read 0,
-  // because an old voltage would look like a measured voltage.
+  // If the converter stops, all inputs read 0: an old voltage would look like a measured voltage.
   void poll() {
     if (!any_) return;
     if (convert()) {
@@ -61,7 +59,6 @@ class AnalogInputs {
     times = (times & ~(7U << shift)) | sampling_time << shift;
   }
 
-  // True if a conversion was finished.
   bool convert() {
     const std::uint32_t control = ADC1->CR;
     if ((control & cr_on) == 0) {  // the core switches the converter off after a reading

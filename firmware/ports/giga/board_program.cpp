@@ -16,7 +16,6 @@ namespace {
 constexpr std::uint32_t settle_ms = 1000;
 constexpr std::uint32_t can_bit_rate = 1000000;
 
-// The chip's unique number in 24 hexadecimal digits.
 Text board_id() {
   static char text[24];
   const std::uint32_t words[] = {HAL_GetUIDw0(), HAL_GetUIDw1(), HAL_GetUIDw2()};

@@ -96,7 +96,6 @@ void write_last_boot(LineWriter& line, const FaultNote& note) {
 
 }  // namespace
 
-// Probes one address. Empty if no chip answers.
 Text BootReport::scan(char (&out)[max_line]) {
   const std::uint8_t address = address_++;
   if (sources_.bus->write(address, nullptr, 0) != firmware::I2cResult::ok) return Text();
@@ -140,7 +139,6 @@ Text BootReport::stacks(char (&out)[max_line]) {
   return line.text(", ours ").number(own.most).text(" of ").number(own.size).done();
 }
 
-// The key numbers, and how many datagrams were dropped for each reason. Empty without a key.
 Text BootReport::keys(char (&out)[max_line]) const {
   const Authentication& authentication = *sources_.authentication;
   if (!authentication.required()) return Text();
@@ -160,7 +158,6 @@ Text BootReport::keys(char (&out)[max_line]) const {
   return line.done();
 }
 
-// Empty if no session since boot had more than one path.
 Text BootReport::paths(char (&out)[max_line]) const {
   const SessionPaths& paths = *sources_.paths;
   if (paths.joins() == 0) return Text();

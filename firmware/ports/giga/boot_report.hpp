@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report of the paper's Figure 3, with its labels, sent on request, one line a turn. Then
-// follow chips, CAN, settings, keys, paths and the end of the last boot. The scan of the I2C bus
-// probes one address a turn, so the loop waits for at most one transfer.
+// The report of the paper's Figure 3, with its labels, and more: on request, one line a turn. The
+// scan of the I2C bus probes one address a turn, so the loop waits for at most one transfer.
 #pragma once
 
 #include <cstdint>

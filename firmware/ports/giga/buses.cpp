@@ -12,7 +12,6 @@ namespace giga {
 
 namespace {
 
-// Switches the outputs of the bus's PCA9685 off. True if a PCA9685 answered.
 bool switch_outputs_off(firmware::I2cBus& bus) {
   std::uint8_t mode = 0;
   const firmware::I2cResult answer =

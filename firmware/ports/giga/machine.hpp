@@ -27,7 +27,6 @@ class Machine final : public StepTick {
   Machine(const Wiring& wiring, ChipTrouble wiring_trouble, Buses& buses);
   // Starts the edge interrupts and the step timer, which becomes a duty of the guard.
   void start(firmware::Guard& guard);
-  // One turn of the loop: at most bus_bytes_per_poll bytes on the bus, and one conversion.
   void poll();
 
   firmware::BoardHardware& hardware() { return hardware_; }
@@ -37,7 +36,6 @@ class Machine final : public StepTick {
   void step_tick() override;
 
  private:
-  // Interrupts at both edges of both lines.
   struct Encoder {
     Line a, b, index;
     Late<mbed::InterruptIn> a_edge, b_edge;
@@ -55,8 +53,7 @@ class Machine final : public StepTick {
     void start(firmware::UltrasonicSensors& with, int number);
     void on_edge();
   };
-  // A 40 kHz interrupt that is later than this counts as missed. The limit is the loop's limit, so
-  // that the core may keep interrupts off for a moment.
+  // As long as the loop's limit, so that the core may keep interrupts off for a moment.
   static constexpr std::uint32_t step_limit_ms = 20;
 
   firmware::BoardPins pins();

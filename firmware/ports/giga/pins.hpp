@@ -16,7 +16,6 @@ inline Pin pin_of(Place place) {
   const GigaPin& pin = giga_pins[place.number()];
   return {pin.port, pin.number};
 }
-// A signal that is not connected gets a line without a pin.
 inline Line line_of(Place place) {
   return place.connected() ? line_of(pin_of(place)) : unconnected_line();
 }
@@ -34,8 +33,7 @@ constexpr std::uint32_t uart_functions[uart_channels] = {7, 8};
 
 constexpr Pin dac_pins[dac_channels] = {{'A', 4}, {'A', 5}};  // A12 A13
 
-// FDCAN2, alternate function 9. The Giga has no transceiver: wire the SN65HVD230 of the R4 board
-// (paper, section 2) to these pins (docs/how-to/can.md).
+// FDCAN2, for the R4 board's transceiver SN65HVD230 (paper, section 2; docs/how-to/can.md).
 constexpr Pin can_tx_pin = {'B', 13};
 constexpr Pin can_rx_pin = {'B', 5};
 constexpr std::uint32_t can_function = 9;

@@ -30,9 +30,8 @@ class SettingsStore {
   void start();
   void avoid() { state_.store(StoreState::avoided, std::memory_order_relaxed); }
   StoreState state() const { return state_.load(std::memory_order_acquire); }
-  // Reads the stored settings. Call once. If there are none, the defaults stay. If the store is
-  // loading or avoided, the stored wiring is unknown and counts as damaged. Then nothing is stored
-  // later, because it would overwrite the old settings.
+  // Call once. Without stored settings the defaults stay. If the store is loading or avoided, the
+  // wiring counts as damaged, and nothing is stored later, as it would overwrite the old settings.
   void load(Settings& settings);
   // Stores `settings` soon, on the thread.
   void keep(const Settings& settings);

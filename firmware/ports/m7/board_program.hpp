@@ -20,7 +20,6 @@ class BoardProgram {
   static_assert(firmware::Application::max_ports >= 2, "each port has a place");
 
  public:
-  // The boot's clock starts at the seed's low half.
   BoardProgram(std::uint64_t seed, Uart& link, UdpPort& udp,
                const firmware::Application::Config& config)
       : clock_(static_cast<std::uint32_t>(seed)),
@@ -66,8 +65,7 @@ class BoardProgram {
     if (!link_.has_received() && !udp_.has_received()) wait_for_interrupt();
   }
 
-  // In timer 1's interrupt, each millisecond. True: the watchdog may be fed. Ends the boot if the
-  // handlers' stack is full.
+  // In timer 1's interrupt, each millisecond. True: the watchdog may be fed.
   bool on_wake() {
     if (!canary_alive()) halt();
     BoardClock::on_wake_interrupt();

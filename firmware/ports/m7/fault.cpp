@@ -9,8 +9,7 @@ namespace m7 {
 
 namespace {
 
-// Survives a reset, so no code may initialize it. After power-up its content is random, and valid
-// only with both marks.
+// Survives a reset: no code may initialize it. Random after power-up; valid only with both marks.
 struct Kept {
   std::uint32_t mark;
   std::uint32_t boots;
@@ -77,7 +76,6 @@ void protect(std::uint32_t number, std::uint32_t base, std::uint32_t log_size,
   at(mpu_rasr) = attributes | (log_size - 1) << 1 | on;
 }
 
-// Forbids writes to the code, and any access below the loop's stack.
 void protect_memory() {
   constexpr std::uint32_t no_access = 0;
   constexpr std::uint32_t read_only = 6U << 24 | 2U << 16;  // normal memory, write-through

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reports each change of the pins on a UART (`tools/m7 --pins`), so that tests need not rely on the
-// board's own states. A line has numbers and spaces: the board's time in ms and in us, time of the
-// last datagram in us, time of the last feeding heartbeat in ms, 1 if the chips' pins are safe,
-// then the outputs as in sim::Pins. A change is noted after its transfer, also in interrupts, and
-// sent by the loop. If notes_max notes wait, later changes are left out.
+// board's states. A line: the time in ms and us, the last datagram in us, the last feeding
+// heartbeat in ms, 1 if the chips' pins are safe, then the outputs as in sim::Pins. A change is
+// noted after its transfer, also in interrupts, and sent by the loop. At most notes_max wait.
 #pragma once
 
 #include <cstddef>

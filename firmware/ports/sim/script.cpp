@@ -120,7 +120,6 @@ void read_divider(const Line& line, ScriptStep& step) {
   }
 }
 
-// "enc1a", "relay8", "handle".
 std::string name_of_defect(int index) {
   static constexpr std::string_view single[] = {"handle", "bypass", "servos", "store"};
   const auto numbered = [index](std::string_view word, int first) {
@@ -253,7 +252,6 @@ constexpr Form forms[] = {
     {"reboot", 1, "reboot", ScriptStep::Kind::reboot, nullptr},
 };
 
-// "handle, us, … or reboot".
 std::string words_of_forms() {
   std::string words;
   for (const Form& form : forms) {

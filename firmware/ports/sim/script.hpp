@@ -67,9 +67,8 @@ struct ScriptStep {
   // ultrasonic, encoder, motor, uart, gpio: 1 …; analog, divider: an Analog; defect: one of
   // defects::Index; chip: a Chip; device: a UserDevice, then an index into OptionalDevices
   int channel = 0;
-  // 1: held, stalled, high or broken; ultrasonic: cm or off; encoder: counts; analog: hundredths of
-  // a volt; divider: hundredths; chip, device: a Supply; hang: ms; user_bus: a UserBusModel::Fault;
-  // uart: a UartPeer
+  // 1: held, stalled, high, broken; ultrasonic: cm, off; encoder: counts; analog: 0.01 V; divider:
+  // hundredths; chip, device: a Supply; hang: ms; user_bus: its Fault; uart: a UartPeer
   std::int32_t value = 0;
   std::string text;  // the line without its time, "handle released"
 };

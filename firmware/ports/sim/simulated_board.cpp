@@ -74,7 +74,6 @@ SimulatedBoard::Milliseconds SimulatedBoard::elapsed() const {
   return std::chrono::floor<Milliseconds>(Clock::now() - start_);
 }
 
-// The chips keep their state until the firmware makes them safe.
 void SimulatedBoard::reset_microcontroller() {
   clock_offset_ms_ = static_cast<std::uint32_t>(scramble(seed_ + boots_));
   ++boots_;
@@ -114,7 +113,6 @@ std::array<std::uint8_t, Authentication::chance_size> SimulatedBoard::chance() c
   return bytes;
 }
 
-// `cause`: the cause that ended the previous boot.
 void SimulatedBoard::boot(SafeReason cause) {
   in_application_ = true;
   application_->start(board_ms(passed_));

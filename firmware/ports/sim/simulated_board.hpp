@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A whole R4 board in a process: the firmware's application and chip drivers on a model of the
-// board, reached through any carriers. Its one timer sleeps until the application needs time. Then
-// the milliseconds that have passed are run, one by one.
+// A whole R4 board in a process: the firmware on a model of the board, reached by any carriers. Its
+// timer sleeps until the application needs time. Then the passed milliseconds are run one by one.
 //
 // If the guard prevents feeding for watchdog_ms, a hardware watchdog resets the microcontroller,
 // not the chips. The loop checks in even on a slow machine; only a script's `hang` prevents that.
-//
 // Used from the thread of its io_context only. A datagram allocates no heap memory.
 #pragma once
 
@@ -43,7 +41,6 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
     std::function<void(std::uint32_t t_ms, Verdict)> on_rejected;
-    // A carrier became a path of the session, or left the session.
     std::function<void(std::uint32_t t_ms, const Carrier&, bool joined)> on_path;
     std::function<void(std::uint32_t t_ms, const Carrier&, const CarrierEvent&)> on_carrier;
   };

@@ -13,7 +13,6 @@ firmware::BoardHardware::Config config_of(const Wiring& wiring, ChipTrouble trou
   return config;
 }
 
-// Bit n: a PCA9685 answers on bus n.
 unsigned answers(BoardChips& chips) {
   std::uint8_t mode = 0;
   const bool answer = chips.bus.write_read(firmware::Pca9685::all_call_address, nullptr, 0, &mode,
@@ -65,7 +64,6 @@ void SimulatedHardware::power_up() {
 void SimulatedHardware::pass_millisecond(bool loop_turns) {
   now_us_ += 1000;
   board_.pass_millisecond(now_us_, *this);
-  // While no stepper moves, one tick is enough.
   const int ticks = hardware_.stepping() ? ticks_per_ms : 1;
   for (int i = 0; i < ticks; ++i) hardware_.step_tick();
   if (loop_turns) hardware_.poll(now_us_);

@@ -20,7 +20,6 @@ class SimulatedHardware final : private BoardModel::Interrupts {
 
   // Switches the outputs off and sets the chips up, in at most boot_ms of the board's time.
   void power_up();
-  // Runs interrupts, timers, and, if the loop turns, the drivers.
   void pass_millisecond(bool loop_turns = true);
 
   firmware::BoardHardware& hal() { return hardware_; }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's time. Microseconds come from the core's free-running timer, also in interrupts and
-// fault handlers, and wrap after 71 minutes. The timer interrupt derives milliseconds from the same
-// timer, so a late interrupt loses no time. They wrap after 49 days.
+// Microseconds of the core's timer, also in interrupts and fault handlers, wrap after 71 minutes.
+// The timer interrupt derives milliseconds from them, so none is lost; they wrap after 49 days.
 #pragma once
 
 #include <cstdint>

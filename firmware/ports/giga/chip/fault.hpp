@@ -7,8 +7,7 @@
 //     duties do not check in (the guard starves)      -> Kind::watchdog
 //     the timer interrupt stops                       -> the watchdog's reset
 //
-// The note is in backup registers of the real-time clock. After the next boot the board reports it
-// and keeps its outputs off until E:CLEAR.
+// The note is in backup registers. The next boot reports it and keeps outputs off until E:CLEAR.
 #pragma once
 
 #include <cstdint>

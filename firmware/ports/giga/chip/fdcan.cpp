@@ -42,7 +42,6 @@ constexpr std::uint32_t filter_element(std::uint32_t id, std::uint32_t other, st
   return 1U << 30 | (fifo + 1) << 27 | id << 16 | other;
 }
 
-// An extended message ID filter element: id and mask, stores into FIFO 0 or 1.
 constexpr std::uint32_t extended_element(std::uint32_t id, std::uint32_t fifo) {
   return (fifo + 1) << 29 | id;
 }

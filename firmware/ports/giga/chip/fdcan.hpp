@@ -8,8 +8,7 @@
 //     to send     urgent frames             -> own buffer; a lower id overtakes the queue
 //                 other frames, in order    -> FIFO of 8 frames
 //
-// An interrupt wakes the loop and reports a stop; the frames stay in the hardware. Times are in
-// microseconds and wrap. Never waits for the bus.
+// An interrupt wakes the loop and reports a stop. Never waits for the bus. Times are us, and wrap.
 #pragma once
 
 #include <cstdint>

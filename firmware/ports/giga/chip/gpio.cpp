@@ -11,7 +11,6 @@ constexpr std::uint32_t all_ports = 0x7FF;  // GPIOAEN … GPIOKEN of RCC_AHB4EN
 // Memory in place of the registers of a port.
 GPIO_TypeDef no_port;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
 
-// Writes `value` into field `index` of a register whose fields are `bits` wide.
 template <class Register>
 void set_field(Register& field, std::uint32_t index, std::uint32_t bits, std::uint32_t value) {
   const std::uint32_t mask = ((std::uint32_t{1} << bits) - 1) << (index * bits);

@@ -68,9 +68,7 @@ void I2cController::start(std::uint32_t kernel_hz) {
   registers_.CR1 = cr1_on;
 }
 
-// After a timeout, a chip that was interrupted within a byte releases SDA, and a second attempt
-// follows. If another transfer took over the bus, no attempt follows, because it could undo that
-// transfer.
+// If another transfer took over the bus, no second attempt follows: it could undo that transfer.
 template <class Attempt>
 I2cResult I2cController::transfer(std::size_t bytes, std::size_t starts, Attempt attempt) {
   constexpr std::uint32_t clean_up_us = 20;
@@ -96,8 +94,7 @@ bool I2cController::alive(const Transfer& transfer) const {
   return transfer.recovery == recoveries_ && clock_() - transfer.began_us < transfer.limit_us;
 }
 
-// If another transfer took over the bus, request() and put() have no effect: an interrupted
-// transfer must not restart, or leave a byte for the next transfer.
+// If interrupted, request() and put() do nothing: no restart, and no byte for the next transfer.
 bool I2cController::request(const Transfer& transfer, std::uint32_t cr2) {
   const InterruptLock lock;
   if (transfer.recovery != recoveries_) return false;
@@ -142,7 +139,6 @@ I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
   }
 }
 
-// A bus error may mean that the chip left the bus, and that the bytes came from an idle bus.
 I2cResult I2cController::receive(const Transfer& transfer, std::uint8_t address,
                                  std::uint8_t* bytes, std::size_t size) {
   if (!request(transfer, cr2_for(address, size) | cr2_read | cr2_then_stop)) {
@@ -170,8 +166,7 @@ I2cResult I2cController::finish(const Transfer& transfer, I2cResult result) {
   return result;
 }
 
-// Software reset: releases the lines and ends the transfer. It also deletes a byte that a refusal
-// left in TXDR, which the next transfer would otherwise send first.
+// Software reset. Deletes a byte left in TXDR, which the next transfer would otherwise send first.
 void I2cController::restart() {
   registers_.CR1 = 0;
   for (int i = 0; i < 3; ++i) {  // PE must be low for three APB clocks

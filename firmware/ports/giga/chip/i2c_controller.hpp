@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An I2C peripheral of the STM32H747 as master at up to 400 kHz (RM0399, chapter I2C). A transfer
-// that lost the bus or timed out is repeated once, on a freed bus, so that one disturbance does not
-// stop the robot. A read with a bus error (BERR) is also repeated, because its chip may have left
-// the bus. A write ignores bus errors: a chip that left does not acknowledge, and as master the
-// peripheral reports false bus errors (ST errata ES0430 2.15.2). An interrupted transfer returns
-// timeout. The core's library (Wire) waits 36 ms for each byte on a hung bus.
+// An I2C peripheral as master at up to 400 kHz (RM0399, chapter I2C). A transfer that lost the bus
+// or timed out is repeated once, on a freed bus, so that one disturbance does not stop the robot. A
+// read with a bus error (BERR) is also repeated, because its chip may have left the bus. A write
+// ignores bus errors: a chip that left does not acknowledge, and as master the peripheral reports
+// false bus errors (ST errata ES0430 2.15.2). The core's Wire waits 36 ms a byte on a hung bus.
 #pragma once
 
 #include <cstddef>

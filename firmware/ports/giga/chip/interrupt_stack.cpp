@@ -7,7 +7,6 @@
 #include "interrupt_lock.hpp"
 
 extern "C" {
-// End of the core's stack, from its linker script.
 extern std::uint32_t __StackLimit[];  // NOLINT: the linker script's name
 
 // NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
@@ -15,7 +14,6 @@ alignas(8) std::uint32_t r4_giga_own_stack[1024];
 alignas(8) std::uint32_t r4_giga_last_stack[192];
 // NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
-// For the fault entry (fault.cpp).
 extern std::uint32_t* const r4_giga_last_stack_top;
 [[gnu::used]] std::uint32_t* const r4_giga_last_stack_top = std::end(r4_giga_last_stack);
 }

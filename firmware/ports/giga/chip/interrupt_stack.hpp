@@ -8,7 +8,6 @@
 //
 // The lowest words of the first two stacks hold a mark. The guard's interrupt checks the marks each
 // millisecond. If a mark is overwritten, the boot ends with all outputs off (fault.hpp).
-// tests/giga/stack_bounds.py checks that our handlers fit by the compiler's figures.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +23,6 @@ void on_own_stack(void (*work)());
 
 // Marks the unused part of both stacks. Call before our first interrupt.
 void mark_interrupt_stacks();
-// True if neither stack has been filled to its last words.
 bool interrupt_stacks_whole();
 
 struct StackUse {

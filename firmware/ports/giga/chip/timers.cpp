@@ -99,8 +99,7 @@ void stop_at_once() {
   NVIC_SetPendingIRQ(MDIOS_IRQn);
 }
 
-// Sets the flag only once: the core's ticker handles late ticks in one interrupt, and more than 16
-// flags in one interrupt are an error.
+// Sets the flag only once: late ticks share one interrupt, which may set at most 16 flags.
 void wake_loop() {
   if (!awake.exchange(true)) loop_flags().set(woken);
 }

@@ -4,9 +4,8 @@
 //     40 kHz   TIM7           stepper steps, encoder index pins
 //     a stop   MDIOS_IRQn     the guard; uses the interrupt of an unused peripheral
 //
-// All handlers run on the stack of interrupt_stack.hpp. A Ticker at 40 kHz would spend most time in
-// the core's timer queue. If the guard does not allow feeding for starve_ms, the board ends its
-// boot with a note, before the watchdog resets it without a note.
+// Handlers run on the stack of interrupt_stack.hpp. A 40 kHz Ticker would spend most time in the
+// core's queue. If not fed for starve_ms, the boot ends with a note before the watchdog resets.
 #pragma once
 
 #include <cstdint>
@@ -28,11 +27,9 @@ class StepTick {  // called in the 40 kHz interrupt
 };
 
 void start_step_timer(StepTick& tick);
-// After this call the guard decides when the watchdog is fed.
 void start_guard_timer(firmware::Guard& guard);
 
-// For a received E:STOP: the guard makes the outputs safe at once. From any interrupt or thread,
-// after start_guard_timer().
+// For a received E:STOP. From any interrupt or thread, after start_guard_timer().
 void stop_at_once();
 
 std::uint32_t timer_input_hz();  // TIM7's input clock

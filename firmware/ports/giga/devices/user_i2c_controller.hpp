@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The user's I2C peripheral as master at up to 100 kHz (RM0399, chapter I2C). Uses no interrupt of
 // its own, so noise on the wires cannot cause a storm of interrupts. The step timer's interrupt
-// moves at most one byte each 25 us; a byte takes 90 us on the wire. The interrupt reads one
-// register, or none when the peripheral is idle. A peripheral that waits for its next byte holds
-// SCL low.
+// moves at most one byte each 25 us; a byte takes 90 us on the wire. A peripheral that waits for
+// its next byte holds SCL low.
 #pragma once
 
 #include <cstddef>

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A USART for the user (RM0399, chapter USART), with its FIFOs of 16 bytes. Uses no interrupt of
 // its own, so noise on the wire cannot cause a storm of interrupts. The step timer's interrupt
-// moves up to two bytes in and one out each 25 us, enough for 460800 baud. It moves none while the
-// UART is off.
+// moves up to two bytes in and one out each 25 us, enough for 460800 baud.
 #pragma once
 
 #include <cstddef>

@@ -42,7 +42,6 @@ void CanPort::pump() {
     const std::uint32_t now_us = clock_();
     const bool urgent = node_.offer_urgent(now_us, frame);
     if (!urgent && !node_.offer(now_us, frame)) return;
-    // If the urgent buffer is full, use the queue.
     const bool accepted = (urgent && controller_.send_urgent(frame)) || controller_.send(frame);
     if (!accepted) return;
     node_.frame_sent(now_us);

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The CAN bus as a port of the application (docs/reference/can.md): datagrams over ISO-TP through
-// an Fdcan. Two lanes, dialogue and telemetry, each with one transfer at a time. In telemetry,
-// heartbeats come first, in order, then one state, which a newer state replaces. A full queue drops
-// and counts new datagrams. When the bus is lost, or no frame leaves for Fdcan::stale_us, all
-// waiting datagrams are dropped. Never waits; from the loop only.
+// The CAN bus as a port of the application (docs/reference/can.md): datagrams over ISO-TP. Two
+// lanes, dialogue and telemetry, each with one transfer at a time. In telemetry, heartbeats come
+// first, then the newest state. A full queue drops and counts new datagrams. When the bus is lost,
+// or stuck for Fdcan::stale_us, all waiting datagrams are dropped. Never waits; from the loop only.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Hands the newest value from one thread to another; neither thread waits. A seqlock: take() fails
-// while the value is written.
+// Hands the newest value to another thread; neither waits. A seqlock: take() fails during a write.
 #pragma once
 
 #include <atomic>
@@ -27,8 +26,7 @@ class HandOver {
     version_.store(before + 2, std::memory_order_release);
   }
 
-  // Takes a value newer than version `known` (0: none); updates `known`. False if there is no newer
-  // value, or the value is being written.
+  // Takes a value newer than version `known` (0: none); updates `known`. False if there is none.
   bool take(std::uint32_t& known, T& value) const {
     const std::uint32_t before = version_.load(std::memory_order_acquire);
     if (before == known || before % 2 != 0) return false;

@@ -8,8 +8,7 @@
 //
 // Joining takes up to 7 s. Without WiFi firmware in the flash the library spins for ever, so the
 // thread has a lower priority than our other threads. The library's status may be wrong for a long
-// time, so the network is also rejoined when hosts that sent datagrams have been silent for
-// quiet_ms.
+// time, so the network is also rejoined when hosts that sent datagrams are silent for quiet_ms.
 #pragma once
 
 #include <atomic>

@@ -27,7 +27,6 @@ class UdpPeers {
 
   // Returns the number of the sender; everyone if `bytes` is not a valid datagram.
   std::uint32_t heard(UdpAddress from, Text bytes) { return hosts_.heard(from, bytes); }
-  // The controlling host keeps its number; everyone: no host is in control.
   void hold(std::uint32_t peer) { hosts_.hold(peer); }
   void also_hold(std::uint32_t peer) { hosts_.also_hold(peer); }
 

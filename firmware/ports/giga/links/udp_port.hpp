@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// UDP as a port of the application. WiFi may block its thread for seconds, so loop and thread
-// exchange datagrams through rings without locks.
+// UDP as a port. WiFi may block its thread for seconds, so lock-free rings connect the loop to it.
 //     loop                         network thread
 //     UdpPort::send()     ----->   UdpLink::take()     skips states older than stale_ms
 //     UdpPort::receive()  <-----   UdpLink::give()
@@ -27,7 +26,6 @@ class UdpLink {
 
   // --- For the network thread.
 
-  // Takes the oldest datagram to send. False: none.
   bool take(std::uint32_t now_ms, std::uint32_t& peer, char (&buffer)[max_datagram],
             Text& datagram) {
     DatagramNote note;
@@ -50,7 +48,6 @@ class UdpLink {
   void set_up(bool up) { up_.store(up, std::memory_order_release); }
 
   bool up() const { return up_.load(std::memory_order_acquire); }
-  // Received datagrams for which the ring had no room.
   std::uint32_t lost() const { return lost_.load(std::memory_order_relaxed); }
 
  private:

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // USB serial as a port of the application: one datagram a line, and the line `report` for the
-// board. The core's Serial.write() waits for ever if a program opens the port and does not read. So
-// lines are sent with send_nb(), one packet at a time, whole or not at all, and the newest state
-// replaces older states (transmit_lines.hpp). An interrupt of low priority takes input and detects
-// a stop while the loop is busy. While the ring is full, input waits at the host. From the loop,
-// except take_in() and listen().
+// board. The core's Serial.write() waits for ever if a program does not read. So send_nb() sends
+// lines, one packet at a time, whole or not at all. The newest state replaces older states. A
+// low-priority interrupt takes input and detects a stop while the loop is busy. While the ring is
+// full, input waits at the host. From the loop, except take_in() and listen().
 #pragma once
 
 #include <cstdint>
@@ -36,8 +35,7 @@ class UsbPort final : public firmware::Port {
   bool take_in();
   bool has_received() const { return !received_.empty(); }
 
-  // Call before receive(). True if one program closed the port and another opened it since the last
-  // turn.
+  // Call before receive(). True if the port was closed and opened again since the last turn.
   bool begin_turn();
 
   // Calls `on_line(Text)` for each line.

@@ -8,8 +8,7 @@ namespace r4 {
 namespace giga {
 
 // Call in each turn of the loop. If the core has closed the endpoint (RM0399, chapter OTG_HS:
-// DIEPCTL), reopens it and drops the packet that was under way. Returns true then: a program has
-// closed the port, even if the next program has opened it since.
+// DIEPCTL), reopens it and drops the packet under way. True then: a program has closed the port.
 bool keep_usb_sending();
 
 }  // namespace giga

@@ -21,7 +21,6 @@ class BoardClock {
     last_ = at(timer0_base + value);
     wake_every(1000, 1000);
   }
-  // Timer 1 interrupts after `first_us`, then each `us`.
   static void wake_every(std::uint32_t us, std::uint32_t first_us) {
     at(timer1_base + control) = 0;
     at(timer1_base + reload) = us * ticks_per_us - 1;

@@ -47,7 +47,6 @@ inline void disable(Irq irq) {
   at(nvic_forget) = 1U << static_cast<unsigned>(irq);
 }
 inline void pend(Irq irq) { at(nvic_pend) = 1U << static_cast<unsigned>(irq); }
-// Lowest priority: all other interrupts may interrupt this handler.
 inline void give_way(Irq irq) {
   constexpr std::uint32_t lowest = 0xFF;
   const std::uint32_t shift = static_cast<unsigned>(irq) % 4 * 8;

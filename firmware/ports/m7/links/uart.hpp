@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The CMSDK UART as a port of the application: one datagram a line. The handlers run in the UART's
-// interrupts, other functions in the loop. Never waits.
+// The CMSDK UART as a port: one datagram a line. Handlers run in its interrupts. Never waits.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Ethernet, ARP, IPv4 and UDP for one port and a static address (RFC 826, 791, 768). No I/O: frames
-// in, frames out. Answers ARP, takes whole UDP datagrams with correct checksums, and writes
-// datagrams. No fragments, no sent options, no routing: all hosts are in the board's /16.
+// Ethernet, ARP, IPv4 and UDP for one port and a static address (RFC 826, 791, 768), without I/O.
+// Answers ARP. No fragments, no sent options, no routing: all hosts are in the board's /16.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// UDP over the LAN9118 as a port of the application. Datagrams to everyone go to the controlling
-// host. Without one, they go to the host that was heard last.
+// UDP over the LAN9118. Datagrams to everyone go to the controlling host, or the host heard last.
 #pragma once
 
 #include <cstdint>

@@ -131,7 +131,6 @@ void I2cBusModel::clear_errors() {
   held_ = 0;
 }
 
-// Aborts a transfer that is under way.
 void I2cBusModel::begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t address) {
   const Held held(*this);
   transfers_ = transfers_ + 1;

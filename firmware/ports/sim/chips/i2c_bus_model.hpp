@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A simulated I2C bus at 400 kHz: chip models with the drivers' interface, and errors on request.
-// Transfers and advance() let simulated time pass. Only an I2cProcessor really waits.
-//
-// An interrupt may make transfers during a transfer. The interrupted transfer then ends with
-// `timeout` and does not change the chips. An I2cProcessor keeps each byte whole, as the wire does.
+// Transfers and advance() let simulated time pass. Only an I2cProcessor really waits, and keeps
+// each byte whole, as the wire does. An interrupt may make transfers during a transfer. The
+// interrupted transfer then ends with `timeout` and does not change the chips.
 #pragma once
 
 #include <cstddef>
@@ -41,7 +40,6 @@ class I2cObserver {
 
 class I2cProcessor {
  public:
-  // The result goes to the matching release_interrupts().
   virtual std::uint32_t hold_interrupts() = 0;
   virtual void release_interrupts(std::uint32_t before) = 0;
   // The wire was busy for `ns`; interrupts may come.
@@ -75,8 +73,7 @@ class I2cBusModel final : public firmware::I2cBus {
   void advance(std::uint64_t us);
   std::uint32_t transfers() const { return transfers_; }
 
-  // Adds an error: false if max_errors of its kind are pending. Refuses `address` after
-  // `after_bytes` bytes of data (0: the address itself), `times` times.
+  // `after_bytes`: of data; 0: the address itself. False if max_errors of its kind are pending.
   bool refuse(std::uint8_t address, std::size_t after_bytes = 0, int times = 1);
   // A chip holds SDA: transfers time out until `recoveries` calls of recover().
   void hold(int recoveries = 1);

@@ -28,7 +28,6 @@ class Mcp23017Model final : public I2cChipModel {
 
   explicit Mcp23017Model(std::uint8_t address) : address_(address) {}
 
-  // Bit n is pin n.
   std::uint8_t driven(int port) const;  // 1: the chip drives the pin
   std::uint8_t level(int port) const;   // of driven pins; of other pins the outside level
   std::uint8_t reg(int port, Register number) const;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The PCA9685 by its data sheet (Rev. 4). Not modelled: the OE pin (held low), the phase of the
-// pulses, test mode. As on the board, there is no external clock. With EXTCLK the outputs keep
-// their levels, pulses high: the worst case that the data sheet allows.
+// The PCA9685 by its data sheet (Rev. 4), without OE pin (held low), phase of pulses and test mode.
+// With EXTCLK, which has no clock, outputs keep their levels, pulses high: the worst case.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An AS5600 by its registers (ams, data sheet v1-06, "Register Description"): a magnet's angle, in
-// 4096ths of a turn. Burnt settings are not modelled.
+// An AS5600 by its registers (ams data sheet v1-06, "Register Description"), no burnt settings.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +16,7 @@ class As5600Model final : public RegisterDevice {
 
   As5600Model() : RegisterDevice(address) { power_on(); }
   void power_on() override;
-  // 0 to 4095.
+  // In 4096ths of a turn: 0 to 4095.
   void turn(std::int32_t angle) { angle_ = static_cast<std::uint16_t>(angle & 0xFFF); }
   void set_magnet(Magnet magnet) { magnet_ = magnet; }
 

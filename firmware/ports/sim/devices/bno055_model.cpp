@@ -42,7 +42,6 @@ void Bno055Model::power_on() {
 
 bool Bno055Model::configures() const { return (registers_[bno_opr_mode] & bno_mode_bits) == 0; }
 
-// Lower byte first.
 void Bno055Model::put(int at, std::int32_t value) {
   const std::int32_t within = value > 0x7FFF ? 0x7FFF : value < -0x8000 ? -0x8000 : value;
   registers_[at] = static_cast<std::uint8_t>(within);

@@ -56,7 +56,6 @@ void Icm20948Model::feel(const std::int32_t (&milli_g)[3], const std::int32_t (&
   centi_c_ = centi_c;
 }
 
-// Higher byte first; the converter does not overflow.
 void Icm20948Model::put(int at, std::int32_t value) {
   const std::int32_t within = value > 0x7FFF ? 0x7FFF : value < -0x8000 ? -0x8000 : value;
   registers_[0][at] = static_cast<std::uint8_t>(static_cast<std::uint32_t>(within) >> 8);

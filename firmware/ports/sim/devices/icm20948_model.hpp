@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An ICM-20948 by its registers (InvenSense DS-000189 rev. 1.3, 7 and 8): accelerometer, gyroscope,
-// thermometer; asleep until PWR_MGMT_1 wakes it.
+// An ICM-20948 by its registers (InvenSense DS-000189 rev. 1.3, 7 and 8), asleep at power-on.
 #pragma once
 
 #include <cstdint>

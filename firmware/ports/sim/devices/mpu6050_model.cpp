@@ -44,7 +44,6 @@ void Mpu6050Model::feel(const std::int32_t (&milli_g)[3], const std::int32_t (&d
   centi_c_ = centi_c;
 }
 
-// Higher byte first; the converter does not overflow.
 void Mpu6050Model::put(int at, std::int32_t value) {
   const std::int32_t within = value > 0x7FFF ? 0x7FFF : value < -0x8000 ? -0x8000 : value;
   registers_[at] = static_cast<std::uint8_t>(static_cast<std::uint32_t>(within) >> 8);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An MPU-6050 by its registers (InvenSense RM-MPU-6000A-00, 4.2): accelerometer, thermometer,
-// gyroscope; asleep until PWR_MGMT_1 wakes it.
+// An MPU-6050 by its registers (InvenSense RM-MPU-6000A-00, 4.2), asleep at power-on.
 #pragma once
 
 #include <cstdint>

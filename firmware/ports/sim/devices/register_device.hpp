@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A device with one address, one-byte registers, and a pointer. A write's first byte sets the
-// pointer, and each other byte moves the pointer.
+// A device with one-byte registers. A write's first byte sets the pointer; later bytes move it.
 #pragma once
 
 #include <cstdint>

@@ -5,9 +5,8 @@
 // The vehicle of the paper's capture (section 4.4) on the bench is connected, or a RobotModel with
 // the bench's supply, handle and steppers:
 //
-//     supply      of the motors: on while the dead-man's handle is held and relay 1 is closed
-//                 (docs/reference/safety.md). Without it no motor turns. A missing
-//                 handle or relay does not interrupt the supply.
+//     supply      of the motors: on while the dead-man's handle is held and relay 1 is closed. A
+//                 missing handle or relay does not interrupt the supply.
 //     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty;
 //                 the index line is high for one of the 1000 counts of a turn, count 0
 //     DHB1A       the steering motor; AINSTEER is its position: 1 V, where forward ends, to 4 V,
@@ -16,11 +15,8 @@
 //     US 1-4      ultrasonic sensors without an obstacle
 //     steppers    a motor each that takes a step at each pulse
 //
-// The firmware's settings do not change the model's wiring. An unconnected pin of the Giga reads
-// low, or high with a pull-up.
-//
-// Analog inputs take the values of the capture as often as they occur in the capture. The choice
-// depends on seed and time only, so the same seed gives the same trace.
+// Settings do not change the model's wiring. An unconnected pin reads low, or high with a pull-up.
+// Analog inputs take the capture's values as often as it has them, chosen by seed and time only.
 #pragma once
 
 #include <cstdint>
@@ -52,7 +48,6 @@ enum Index : std::uint8_t {
 
 class BoardModel {
  public:
-  // Edges that interrupt the microcontroller.
   class Interrupts {
    public:
     virtual void on_edge(const firmware::InputPin& pin, bool high, std::uint32_t at_us) = 0;
@@ -77,7 +72,6 @@ class BoardModel {
   BoardChips& chips() { return chips_; }
   const BoardChips& chips() const { return chips_; }
   UserDevices& devices() { return devices_; }
-  // The pins of the Giga that firmware with this wiring uses.
   firmware::BoardPins microcontroller_pins(const Wiring& wiring);
   firmware::InputPin& input_at(Place place);
   Pins pins() const;

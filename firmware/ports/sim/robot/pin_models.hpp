@@ -40,7 +40,6 @@ class AnalogOutputPinModel final : public firmware::AnalogOutputPin {
   std::uint16_t millivolts_ = 0;
 };
 
-// A step at each rising edge, which the motor takes if it has supply.
 class StepperDriverModel {
  public:
   StepperDriverModel() { step_.driver = this; }
@@ -49,7 +48,6 @@ class StepperDriverModel {
 
   firmware::OutputPin& step() { return step_; }
   firmware::OutputPin& direction() { return direction_; }
-  // The level of the direction pin that means forward; high unless set.
   void set_forward_level(bool high) { forward_level_ = high; }
   bool forward() const { return direction_.high() == forward_level_; }
 
@@ -57,7 +55,6 @@ class StepperDriverModel {
   void supply_motor(bool supplied) { supplied_ = supplied; }
   // Commanded steps since power_on(), forward less backward; wraps at 32 bits.
   std::int32_t position() const { return static_cast<std::int32_t>(position_); }
-  // The steps that the motor took.
   std::int32_t shaft() const { return static_cast<std::int32_t>(shaft_); }
   std::uint32_t pulses() const { return step_.pin.rises(); }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An ultrasonic sensor HC-SR04 (data sheet): after a trigger pulse its echo line is high for 58 us
-// per centimetre, or 38 ms without an obstacle.
+// An HC-SR04 (data sheet): after a trigger, echo is high for 58 us/cm; 38 ms: no obstacle.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,6 @@ class UltrasonicModel {
   static constexpr std::uint32_t nothing_us = 38000;
 
   OutputPinModel& trigger() { return trigger_; }
-  // 0: no obstacle.
   void set_distance(std::uint16_t cm) { cm_ = cm; }
   std::uint16_t distance() const { return cm_; }
   void connect(bool connected) { connected_ = connected; }
