@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Functions of a transport that only boards use. For a carrier that is not a BoardEnd,
-// board_end_of() returns an end whose functions do nothing.
+// Functions that only boards use. They do nothing for a carrier that is not a BoardEnd.
 #pragma once
 
 #include "r4link/carrier.hpp"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An owned file descriptor, the problem when the system has no resources left, and sockets of Asio
-// that a child process does not inherit, because the child would keep the port open.
+// File descriptors, and sockets of Asio that a child does not inherit: it would keep the port open.
 #pragma once
 
 #include <fcntl.h>
@@ -68,8 +67,7 @@ inline std::optional<Problem> out_of_resources(const std::string& thing, int err
           std::to_string(4 * limit.rlim_cur)};
 }
 
-// Throws std::system_error if the system refuses the watches that wake a new event loop for timers
-// and calls. Asio does not check this, and the loop would sleep for ever.
+// Throws std::system_error if a new loop would sleep for ever: Asio does not check its watches.
 inline void require_watches() {
   const FileDescriptor epoll(::epoll_create1(EPOLL_CLOEXEC));
   const FileDescriptor events[] = {FileDescriptor(::eventfd(0, EFD_CLOEXEC)),

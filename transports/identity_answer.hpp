@@ -17,7 +17,6 @@ struct IdentityAnswer : BoardIdentity {
 
 // The question, without a packet number, because it is not part of a session.
 std::string identity_question();
-// None if the datagram is not a board's answer.
 std::optional<IdentityAnswer> read_identity_answer(Text bytes);
 
 }  // namespace r4

@@ -31,7 +31,6 @@ class Registry {
     std::function<bool(const Url& url)> own = nullptr;
   };
 
-  // The registry of udp, serial, pty and can.
   static Registry standard();
 
   void add(Entry entry);
@@ -40,7 +39,6 @@ class Registry {
   // The carrier of a URL, not yet opened and not shared: a host's `share` option is ignored. Throws
   // Error{usage} for an unknown scheme, or a URL that the scheme does not accept.
   std::unique_ptr<Carrier> make(asio::io_context& io, std::string_view url, Role role) const;
-  // The carrier of a host that shares the transport with other programs of this computer.
   std::unique_ptr<Carrier> make_shared(asio::io_context& io, std::string_view url,
                                        BoardRole role) const;
 

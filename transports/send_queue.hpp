@@ -3,8 +3,7 @@
 //     stop    first; never expires; the ninth replaces the oldest
 //     normal  in order; refused when the lane is full
 //     state   last; newest wins: when the lane is full, a new state replaces the oldest
-// Entries other than stops expire after 100 ms. A lane allocates its memory for its first entry,
-// because each board has a queue and most queues stay empty.
+// Entries other than stops expire after 100 ms. A lane has no memory before its first entry.
 #pragma once
 
 #include <chrono>
@@ -33,7 +32,6 @@ class SendQueue {
     std::string_view text() const { return {bytes, size}; }
   };
 
-  // Adds the number of dropped datagrams to `dropped`.
   SendQueue(std::size_t normal, std::size_t states, std::uint64_t& dropped);
 
   // Returns `sent` if the datagram waits now, else `full`. `bytes`: at most max_datagram long.

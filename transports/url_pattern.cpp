@@ -41,7 +41,6 @@ std::size_t range_size(std::string_view text) {
   return end == dash + 1 ? 0 : end;
 }
 
-// Puts braces around the value at `at` if that is a range.
 void brace(std::string& text, std::size_t at) {
   const std::size_t size = range_size(std::string_view(text).substr(at));
   const std::size_t end = at + size;
@@ -90,7 +89,6 @@ std::vector<std::string> numbers_of(std::string_view pattern, std::string_view l
   return numbers;
 }
 
-// As expand_urls(), for one path.
 std::vector<PatternUrl> expand_path(std::string_view pattern) {
   std::vector<PatternUrl> all{{"", ""}};
   std::string text = with_braces(pattern);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The emergency stop of a CAN bus, which every board obeys. Its frames overtake all waiting frames.
-// CanBus owns one object, so that its members share one stop.
+// The emergency stop of a CAN bus, shared by the members of a CanBus. Overtakes all waiting frames.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -27,9 +26,8 @@ class BusStops {
 
   // Sends the frame without a number. Boards of all versions obey it, each time as a new stop.
   SendResult send_bare();
-  // Sends the bare frame of a stop that needs confirmation, and sets `number` for repeat(). Stops
-  // announced in one turn of the loop, within `together`, share one frame and number. If `own` has
-  // an earlier stop with this number, a new number is used.
+  // Sends a stop's bare frame, and sets `number` for repeat(). Stops of one turn of the loop,
+  // within `together`, share both, unless `own` has an earlier stop with that number.
   SendResult announce(const StopNumbers& own, std::uint32_t& number);
   // Sends the frame with that number, unless it was sent within `spacing`.
   SendResult repeat(std::uint32_t number);

@@ -107,15 +107,13 @@ bool CanBus::has(const Member* member) const {
                      [member](const Place& place) { return place.member == member; });
 }
 
-// No effect while a loop over the members runs.
 void CanBus::clear_places() {
   if (calling_ != 0 || sending_) return;
   if (std::erase_if(members_, [](const Place& place) { return place.member == nullptr; }) != 0)
     hear();
 }
 
-// If the kernel refuses the filters, the bus goes down in the next turn of the loop, because a
-// member may be joining or leaving.
+// If refused, the bus goes down in the next turn, because a member may be joining or leaving.
 void CanBus::hear() {
   if (medium_->number() < 0 || set_filters()) return;
   asio::post(io_, deafness_.handler([this, error = errno] {
@@ -279,7 +277,6 @@ void CanBus::be_down(Problem problem) {
   tell({was_up ? CarrierEvent::Kind::down : CarrierEvent::Kind::warning, std::move(problem)});
 }
 
-// Also ends a warning of a bus that is up.
 void CanBus::come_up() {
   const Trouble before = std::exchange(trouble_, Trouble::none);
   standing_.reset();

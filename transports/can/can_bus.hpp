@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A CAN medium that members in one event loop share. It has one socket with kernel filters for the
 // ids in use, passes frames in batches, and reports the state of the bus as events.
-//
 // A member receives the frames with the ids of all members, except frames that members send. Frames
-// leave in the order of the offers, and no transfer interrupts another member's transfer. The bus
-// takes at most `ahead` frames, and more when the interface has taken all of these frames. After
-// 100 ms without progress the bus drops the frames. Without a wire (vcan, vxcan), the bus polls
-// briefly before it sleeps.
+// leave in the order of offers, and no transfer interrupts another member's transfer. The bus takes
+// at most `ahead` frames, and more when the interface has taken all of them. After 100 ms without
+// progress it drops them. Without a wire (vcan, vxcan), it polls briefly before it sleeps.
 #pragma once
 
 #include <algorithm>
@@ -84,8 +82,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool has(const Member* member) const;
 
   void send();
-  // Delivers the arrived frames; true if there were any. Call it before acting on a time-out,
-  // because a delayed loop may find the time-out and the frame together.
+  // True if frames were delivered. Call before acting on a time-out: a late loop may find both.
   bool take();
   BusStops& stops() { return stops_; }
 

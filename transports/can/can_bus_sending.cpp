@@ -24,8 +24,7 @@ void CanBus::send_urgent(std::uint32_t now_us) {
   }
 }
 
-// Takes frames from members, one member's transfer after another. True if there are any. Called
-// only when no frame is left, so that members offer their newest datagrams.
+// Called only when no frame is left, so that members offer their newest datagrams.
 bool CanBus::refill(std::uint32_t now_us) {
   std::size_t quiet = 0;
   while (out_count_ < ahead && quiet < members_.size()) {

@@ -97,7 +97,6 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   std::uint32_t armed_for_us_ = 0;
 };
 
-// A board's packing is a setting, not a URL option.
 std::uint8_t node_of(const Url& url, Role role) {
   url.allow_only(role == Role::host ? "node fd pack" : "node fd");
   can_interface_of(url);

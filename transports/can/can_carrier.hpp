@@ -38,7 +38,6 @@ std::unique_ptr<Carrier> make_can_carrier_on(asio::io_context& io, CanCarrierOpt
 std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role,
                                           const Claim& = {});
 
-// The name under which programs share the path: the interface and the board's number.
 ShareName can_share_name(const Url& url);
 
 }  // namespace r4

@@ -47,9 +47,7 @@ class CanMedium {
   virtual int number() const = 0;
   // True without a controller and a wire: frames come as fast as programs send them.
   virtual bool simulated() const { return false; }
-  // True if a CAN FD frame with bit rate switching (BRS) was received.
   virtual bool heard_rate_switch() const { return false; }
-  // The controller's state, if known: CanInterface::state.
   virtual std::string state() const { return ""; }
   // `error`: errno.
   virtual Problem problem(int error) const = 0;
@@ -61,7 +59,6 @@ class CanMedium {
 
   // Takes up to `batch` frames. Returns their number or -errno (EAGAIN: no frame).
   virtual int receive(std::array<Received, batch>& frames) = 0;
-  // Hands over frames in order. Sets `sent` to the number of accepted frames.
   virtual Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent) = 0;
   // Hands over one frame ahead of all waiting frames except stops.
   virtual Outcome send_first(const CanFrame& frame) = 0;

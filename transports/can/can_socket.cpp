@@ -23,8 +23,7 @@
 namespace r4 {
 namespace {
 
-// Frames in the kernel's queue of an interface can be neither replaced nor overtaken. So a socket
-// keeps few frames there, by the kernel's smallest buffer: about six.
+// Frames in the kernel's queue cannot be withdrawn, so the smallest buffer keeps about six there.
 constexpr int least_send_buffer = 1;
 constexpr int receive_buffer = 1 << 20;
 // The highest priority without a privilege: the first band of pfifo_fast.

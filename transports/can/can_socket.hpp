@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A raw SocketCAN socket on one interface: batches of frames with arrival times, error frames of
-// the controller, sends that never wait, and filters in the kernel.
+// A raw SocketCAN socket: arrival times, error frames, kernel filters, sends that never wait.
 #pragma once
 
 #include <array>
@@ -21,7 +20,6 @@ Problem can_problem(const std::string& interface, int error);
 
 class CanSocket final : public CanMedium {
  public:
-  // `fd`: CAN FD frames can be sent.
   CanSocket(std::string interface, bool fd);
   ~CanSocket() override;
 

@@ -61,7 +61,6 @@ class CanTrouble {
            host_heard_ - frames_since_ >= host_completes;
   }
 
-  // The newest times; initially long ago.
   Time board_heard_;
   Time host_heard_;
   Time host_completed_;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decides which host sends on a board's command id (docs/reference/can.md, "Several hosts"). All
-// hosts answer a heartbeat at once. On one id their frames would mix and, on real wires, drive
-// hosts bus-off. So a host listens before it sends. The later host is silent until it has received
-// no frame of the earlier host for a second. The emergency stop needs no turn, because all hosts
-// send the same frame.
+// Decides which host sends on a board's command id (docs/reference/can.md, "Several hosts"). On one
+// id the frames of two hosts would mix and, on real wires, drive hosts bus-off. So a host listens
+// before it sends. The later host is silent until it has received no frame of the earlier host for
+// a second. The emergency stop needs no turn, because all hosts send the same frame.
 #pragma once
 
 #include <chrono>
@@ -31,7 +30,6 @@ class CanTurn {
     state_ = State::listening;
     until_ = now + listening;
   }
-  // True if a datagram may begin.
   bool ours(Time now) {
     if (state_ != State::ours && now >= until_) {
       state_ = State::ours;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The numbers of one host's stops on a bus. A number has 18 bits and replaces the stop's packet
-// number of 32 bits. A board reports the number in the heartbeat field STOP. Keeps the newest 16
-// stops, as many as a session repeats.
+// On the bus, a stop of this host has a number of 18 bits instead of its packet number of 32 bits.
+// A board reports it in the heartbeat field STOP. Keeps the newest 16, as a session does.
 #pragma once
 
 #include <cstddef>
@@ -18,9 +17,7 @@ class StopNumbers {
 
   // The bus carries the stop `pnum` under the number `carried`.
   void add(std::uint32_t pnum, std::uint32_t carried);
-  // Sets `carried` to the stop's number on the bus. False if the stop is not known.
   bool find(std::uint32_t pnum, std::uint32_t& carried) const;
-  // True if the bus carries a stop of this host under that number.
   bool carries(std::uint32_t carried) const { return stop_of(carried) != nullptr; }
 
   // In a heartbeat that reports one of these stops, replaces the number by the packet number. The

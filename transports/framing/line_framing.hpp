@@ -15,9 +15,8 @@ namespace r4 {
 
 class LineFraming {
  public:
-  // Calls `on_line(Text)` for each completed line, without terminator. The Text is valid during the
-  // call; a line that is whole in `data` is not copied. Calls `on_oversize(Text)` as soon as a line
-  // is too long, with its first max_datagram bytes.
+  // Calls `on_line(Text)` for each line without its end, and `on_oversize(Text)` as soon as a line
+  // is too long, with its first max_datagram bytes. The Text is valid during the call.
   template <class OnLine, class OnOversize>
   void push(const char* data, std::size_t size, OnLine&& on_line, OnOversize&& on_oversize);
   template <class OnLine>

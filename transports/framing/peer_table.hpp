@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers for the hosts that send to a board over UDP.
-// Each sender of a valid datagram gets a place. If no place is free, it replaces the sender that
-// was silent longest. The controlling host keeps its place, because the board recognizes the host
-// by its number. Datagrams for everyone go to one sender, the audience, which is the controlling
-// host if there is one. A watcher never becomes the audience, because its lease brings it all
-// datagrams. A number is never given twice.
+// Numbers for the hosts that send valid datagrams to a board over UDP. If no place is free, a new
+// host replaces the host that was silent longest. The controlling host keeps its place, because the
+// board recognizes the host by its number. Datagrams for everyone go to one sender, the audience,
+// which is the controlling host if there is one. A watcher never becomes the audience, because its
+// lease brings it all datagrams. A number is never given twice.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +18,6 @@ class PeerTable {
   static constexpr int capacity = places;
   static constexpr std::uint32_t nobody = 0;
 
-  // The number of the sender of `bytes`; `nobody` if `bytes` are not a valid datagram.
   std::uint32_t heard(const Address& from, Text bytes) {
     Datagram datagram;
     if (!read_datagram(bytes, datagram)) return nobody;
@@ -40,8 +38,7 @@ class PeerTable {
     return false;
   }
 
-  // The host of that number has control and keeps its place until another host is held. With
-  // `nobody`, the host has lost control, and may regain it.
+  // That host has control and keeps its place. `nobody`: the host lost control, and may regain it.
   void hold(std::uint32_t number) {
     in_control_ = number != nobody;
     if (!in_control_) return;
@@ -54,7 +51,6 @@ class PeerTable {
     held_[held_count_++] = number;
   }
 
-  // The address of that number; null if the number has no place.
   const Address* find(std::uint32_t number) const {
     for (const Entry& entry : entries_) {
       if (number != nobody && entry.number == number) return &entry.address;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport with a bad link: Impairment applies to the datagrams of both directions, at either
-// end of any transport. On CAN it affects whole datagrams, not frames.
+// A transport with a bad link in both directions. On CAN it affects whole datagrams, not frames.
 #pragma once
 
 #include <asio/io_context.hpp>

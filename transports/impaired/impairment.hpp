@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A deliberately bad link, and its effect on the datagrams of one direction. No I/O, no clock. The
-// effects depend only on the seed, the datagrams and their times.
+// A deliberately bad link. Its effects depend only on seed, datagrams and their times. No I/O.
 #pragma once
 
 #include <cstddef>
@@ -28,8 +27,7 @@ struct Impairment {
   Time cut_for{0};
   std::uint64_t seed = 1;
 
-  // "loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7"; +- also means ±. Throws
-  // Error{usage}.
+  // "loss=5%,delay=20ms±10,corrupt=0.1%,cut=10s+2s,seed=7"; +- also means ±. Throws Error{usage}.
   static Impairment parse(std::string_view text);
 };
 
@@ -55,7 +53,6 @@ class ImpairedDirection {
   ImpairedDirection(const Impairment& impairment, std::uint64_t stream, Time opened);
 
   void put(Time now, Item item);
-  // When the next datagram arrives.
   std::optional<Time> due() const;
   std::optional<Item> take(Time now);
   const ImpairmentCounters& counters() const { return counters_; }

@@ -4,7 +4,6 @@
 //        │   open() returns   ▲   send() throws, or end()  ▲ │    end()
 //        │                    └──── open() returns ────────┼─┘
 //        └───────────────────────── open() throws ─────────┘
-//
 // In `down`, the thread calls open() five times a second. The loop waits for the first open() only.
 #pragma once
 
@@ -38,8 +37,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   static constexpr std::chrono::milliseconds pause{200};  // between two calls of open()
   static constexpr std::chrono::seconds end_patience{1};
 
-  // `news()` is called when items wait for take(), or the transport went up or down. It is called
-  // on any thread, under the lock.
+  // `news()`, on any thread, under the lock: items wait, or the transport went up or down.
   Exchange(std::string name, std::unique_ptr<Own> own, std::unique_ptr<Outbox> outbox,
            std::function<void()> news)
       : name_(std::move(name)),
@@ -49,9 +47,8 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
 
   // --- on the loop
 
-  // The first call starts the thread, and waits until open() has returned or thrown. After that the
-  // thread reopens the transport by itself. Throws Error if the transport is not up. A later call
-  // drops the items that were received before it.
+  // The first call starts the thread and waits for open(). A later call drops the items that were
+  // received before it. Throws Error if the transport is not up.
   void start() {
     std::unique_lock lock(mutex_);
     if (!thread_.joinable()) {
@@ -74,7 +71,6 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     lock.unlock();
     ended ? thread_.join() : thread_.detach();
   }
-  // Calls `put(outbox)` if the transport is up, and returns whether it is.
   template <class Put>
   bool send(Put put) {
     const std::lock_guard lock(mutex_);
@@ -83,8 +79,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     changed_.notify_all();
     return true;
   }
-  // At most `most` received items, oldest first. If it returns `most`, news() follows. Returns no
-  // items while the transport is not up, and no items from before a failure.
+  // At most `most` items, oldest first; none from before a failure. After `most`, news() follows.
   std::vector<Item> take(std::size_t most) {
     const std::lock_guard lock(mutex_);
     if (state_ != State::up) return {};
@@ -119,7 +114,6 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
 
   // --- on any thread
 
-  // Ignores an item of an earlier opening.
   void received(std::uint64_t opening, Item item) {
     const std::lock_guard lock(mutex_);
     if (ending_ || opening != opening_) return;
@@ -169,7 +163,6 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
       });
     });
   }
-  // Calls `function` without the lock. False if it throws.
   template <class Function>
   bool call(std::unique_lock<std::mutex>& lock, Function function) {
     lock.unlock();

@@ -180,8 +180,7 @@ class OwnCanMedium final : public CanMedium {
   bool open_ = false;
 };
 
-// The carrier of can:// on a source of frames. The source outlives a CanBus that could not be
-// opened, and ends with the carrier.
+// The source outlives a CanBus that could not be opened, and ends with the carrier.
 class OwnCanCarrier final : public Carrier, public BoardEnd {
  public:
   OwnCanCarrier(asio::io_context& io, const CanCarrierOptions& options,

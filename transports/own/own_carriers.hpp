@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The carriers on a program's own transports (r4link/transports/own_transport.hpp).
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -10,7 +9,6 @@
 namespace r4 {
 
 std::unique_ptr<Carrier> make_own_carrier(Loop& loop, std::shared_ptr<OwnTransport> transport);
-// At either end of the link.
 std::unique_ptr<Carrier> make_own_can_carrier(asio::io_context& io, std::shared_ptr<OwnCanBus> bus,
                                               const OwnCanNode& node, Role role);
 

@@ -33,8 +33,6 @@ class LineCarrier : public Carrier {
  protected:
   LineCarrier(asio::io_context& io, std::string name, std::chrono::milliseconds look_interval);
 
-  // --- implemented by the ends
-
   // Looks for the device, and starts the stream if the device exists.
   virtual void look() = 0;
   // The stream has ended. `error`: errno, or 0 for an end of file. Returns the problem to report.
@@ -45,8 +43,6 @@ class LineCarrier : public Carrier {
   virtual void before_state() {}
   // The system has taken that many bytes. Called within send().
   virtual void on_written(std::size_t) {}
-
-  // --- for the ends
 
   // Begins to receive from the descriptor, which must not block. `asks`: may_read() is called
   // before each read. Throws Error about `thing` if the loop cannot wait for the stream.
@@ -85,7 +81,6 @@ class LineCarrier : public Carrier {
   SendQueue queue_;
   std::array<char, 4096> received_;
 
-  // The line in progress: line_[line_written_, line_size_) is still to be written.
   std::array<char, 2 * line_end.size() + max_datagram> line_;
   std::size_t line_size_ = 0;
   std::size_t line_written_ = 0;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The serial ports of this machine.
 #pragma once
 
 #include <cstdint>

@@ -18,7 +18,6 @@ class PortLock {
  public:
   // False, with errno, if another program has the port and does not yield.
   bool lock(int device, const DeviceClaim& claim);
-  // True if another program has taken the port from this program.
   bool is_taken() const;
   // True if the port was free, not taken from another program.
   bool is_first() const { return place_ == 0; }

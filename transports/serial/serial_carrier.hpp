@@ -3,9 +3,8 @@
 //     serial:///dev/ttyACM0[?baud=1000000]   that device, or a link to one
 //     serial:auto                            the one R4 board on USB (2341:0266)
 //     serial:?sn=SERIAL                      the USB device with that serial number
-// 8N1, raw, no flow control, locked. Rates below 9600 are refused: 1200 baud orders an Arduino to
-// erase its program. If a port is unplugged, the carrier is `down` at once, and searches for the
-// port by serial number or path.
+// Rates below 9600 are refused: 1200 baud orders an Arduino to erase its program. If a port is
+// unplugged, the carrier is `down` at once, and searches for the port by serial number or path.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -12,7 +12,6 @@ namespace r4 {
 
 // libserialport opens a device with an entry in sysfs, Asio any other device (a pty). Low latency
 // is set if the driver has it. Earlier input is discarded. EAGAIN means no data, 0 bytes a hang-up.
-//
 // A second opening fails: `lock` excludes other r4 programs, TIOCEXCL all programs. TIOCEXCL is not
 // set for a pty, because the simulated board could not count its host's unread bytes. TIOCEXCL
 // outlasts the program, so it is not set by a program that yields the port or took it.

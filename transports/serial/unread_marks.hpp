@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Computes when the oldest unread byte of a stream was written, from the numbers of written and
-// unread bytes. Times are exact to `grain`, and never too late. No heap.
+// Computes when the oldest unread byte was written: exact to `grain`, never too late. No heap.
 #pragma once
 
 #include <array>
@@ -20,7 +19,6 @@ class UnreadMarks {
   void clear() { count_ = 0; }
 
   bool any() const { return count_ != 0; }
-  // When the oldest unread byte was written. Only if any().
   Time oldest() const { return marks_[first_].time; }
 
  private:

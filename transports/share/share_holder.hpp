@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The end of a shared transport in the program that holds it. It sends a copy of every datagram to
-// the first most_served programs that send hello, and obeys a stop of any program. A program that
-// stopped the board is served beyond that limit, so it receives whether the board obeys. A slow
-// program loses copies.
+// The end of a shared transport in the program that holds it. Sends a copy of every datagram to the
+// first most_served programs that send hello, and obeys a stop of any program. A program that
+// stopped the board is served beyond that limit, to see the result. A slow program loses copies.
 #pragma once
 
 #include <asio/io_context.hpp>

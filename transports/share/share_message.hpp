@@ -40,7 +40,6 @@ struct ShareMessage {
   CarrierEvent event;     // event
 };
 
-// True for a copy of a datagram on the transport.
 constexpr bool is_copy(ShareMessage::Kind kind) {
   using Kind = ShareMessage::Kind;
   return kind == Kind::received || kind == Kind::sent || kind == Kind::oversize;

@@ -16,8 +16,7 @@
 namespace r4 {
 namespace {
 
-// Connections that wait to be accepted, each for about 0.4 ms (ShareHolder::between_arrivals). The
-// last program must be accepted before it stops waiting for an answer.
+// At 0.4 ms each (ShareHolder::between_arrivals), the last program is accepted before it gives up.
 constexpr int most_waiting = 24;
 // About 80 states, so a program that wakes up reads nothing much older than a second.
 constexpr int buffer_bytes = 32 * 1024;
@@ -74,8 +73,7 @@ FileDescriptor take_share_name(const ShareName& name, BoardRole role) {
   });
 }
 
-// Another user's programs may keep the holder's queue full. A place is free for microseconds after
-// each accept(), so this function tries for about the time between two accept() calls.
+// Tries for about the time between two accept() calls, because other users may keep the queue full.
 FileDescriptor connect_to_holder(const ShareName& name, BoardRole role) {
   return local_socket(name, role, [](int local, const sockaddr* address, socklen_t size) {
     constexpr int most_tries = 300;

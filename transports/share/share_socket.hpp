@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The local sockets of programs that share a transport. The kernel keeps their abstract names
-// (unix(7)), in a network namespace, until the program ends. A transport has two names. The first
-// is for the controlling program. The second is for a watching program that holds the transport
-// while no program controls the board. A name contains the user's number or the sharing group's
-// name. Any user can take a name, so both ends read the user at the other end from the kernel. No
-// call blocks.
+// (unix(7)), in a network namespace, until the program ends. A transport has two names: for the
+// controlling program, and for a watching program that holds the transport while no program
+// controls the board. A name contains the user's number or the sharing group's name. Any user can
+// take a name, so both ends read the user at the other end from the kernel. No call blocks.
 #pragma once
 
 #include <sys/types.h>

@@ -80,11 +80,9 @@ class SharedCarrier final : public Carrier,
   void on_drained() override { handler_->on_drained(); }
   void on_overheard(std::string_view bytes) override;
   void on_oversize(std::string_view beginning) override;
-  // Called for the programs that this holder serves.
   std::vector<CarrierEvent> standing() const override;
   void on_stop_of_another(std::string_view datagram) override;
   void on_asked() override;
-  // Called by the connection to the holder that serves this program.
   void on_message(const ShareMessage& message) override;
   void on_all_heard() override { handler_->on_drained(); }
   void on_no_help(const Problem& why) override;
@@ -101,7 +99,6 @@ class SharedCarrier final : public Carrier,
   void look();
   void look_later(milliseconds delay);
   bool late() const { return Clock::now() - search_.began >= take_over_within; }
-  // True if another program holds the transport, and takes this program's stops.
   bool is_served() const {
     return state_ == State::joined || (state_ == State::asking && role_ == BoardRole::watch);
   }
@@ -305,8 +302,6 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
   return client_.send_stop(bytes);
 }
 
-// --- this program holds the transport
-
 void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
   // This program first, because it may be driving.
   handler_->on_datagram(bytes, from);
@@ -331,7 +326,6 @@ void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   if (is_gone && state_ == State::holding) lose();
 }
 
-// Reports to the served programs, and to this program unless the event was reported.
 void SharedCarrier::tell(const CarrierEvent& event) {
   const bool up = event.kind == CarrierEvent::Kind::up;
   const bool down = event.kind == CarrierEvent::Kind::down;
@@ -364,8 +358,6 @@ void SharedCarrier::on_stop_of_another(std::string_view datagram) {
 void SharedCarrier::on_asked() {
   if (role_ == BoardRole::watch) lose();
 }
-
-// --- another program holds the transport
 
 void SharedCarrier::on_message(const ShareMessage& message) {
   switch (message.kind) {

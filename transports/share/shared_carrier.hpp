@@ -7,13 +7,11 @@
 //      |   +---- a controlling program asks for the transport, or takes it; or the role changes
 //      |   |
 //      +-> holding, with the carrier open: no program holds it, or the holder was passed over
-//
 // The controlling program holds the transport, so its datagrams never wait for another program. It
 // also has a separate name, so a second controlling program is refused at once. Watching programs
 // receive all datagrams, and send stops. A program that takes control first takes the separate
-// name. If the name is refused, nothing changes. Otherwise the program reopens the transport,
-// because a controlling program opens it differently (DeviceClaim). The served programs then seek
-// the holder again.
+// name; if refused, nothing changes. Then it reopens the transport, because a controlling program
+// opens it differently (DeviceClaim), and the served programs seek the holder again.
 #pragma once
 
 #include <asio/io_context.hpp>

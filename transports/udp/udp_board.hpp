@@ -25,8 +25,7 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
   bool reaches(Peer peer) const override;
 
  private:
-  // A host, and the address of this computer to which it sends and from which its answers leave.
-  // Unspecified if the socket has one address only.
+  // `at`: the own address to which the host sends; unspecified if the socket has one address only.
   struct Place {
     Endpoint host;
     asio::ip::address at;

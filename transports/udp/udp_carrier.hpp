@@ -7,18 +7,15 @@
 // Options of a host: listen=2390 is its port, which the boards of one program share
 // (udp_host_socket.hpp); 0: any free port. With HOST, local=ADDRESS sends from that address of this
 // computer, by its interface. In a search (board_search.hpp), port=2018 is the boards' port.
-//
 // A board keeps the last 16 hosts that sent a valid datagram, and always the controlling host.
 // Datagrams for everyone go to the peer in the URL, else to the controlling host, else to the host
 // heard last. An answer goes to the sender of the question, and also to a peer at the same address,
 // because the paper's Python client does not listen at the port from which it asks.
-//
-// open() looks a name up, IPv4 first. Within a handler of the loop a host's open() does not wait.
-// The host is `down` until the name is known, and repeats the lookup each second. If a host hears
-// nothing valid for 3 to 6 s, it repeats the lookup or search, and follows the board to a new
-// address. The board that a search found stays the wanted board until close(). A board that is off
-// (port unreachable) counts as silent. If the network is unreachable, the host is `down` and tries
-// the network again five times a second.
+// open() looks a name up. Within a handler of the loop a host's open() does not wait. The host is
+// `down` until the name is known, and repeats the lookup each second. If a host hears nothing valid
+// for 3 to 6 s, it repeats the lookup or search, and follows the board. The board that a search
+// found stays the wanted board until close(). A board that is off (port unreachable) counts as
+// silent. If the network is unreachable, the host is `down` and tries again five times a second.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -27,7 +27,6 @@ constexpr std::size_t normal_entries = 64;
 constexpr std::size_t state_entries = 20;  // four for the host and for each watcher
 constexpr std::chrono::milliseconds probe_interval{200};
 
-// True if the network is lost; false if only one packet failed.
 bool is_network_loss(int error) {
   return error == ENETUNREACH || error == ENETDOWN || error == EHOSTUNREACH ||
          error == EADDRNOTAVAIL || error == ENODEV;

@@ -35,17 +35,12 @@ class UdpEnd : public Carrier {
 
   UdpEnd(asio::io_context& io, UdpUrl url);
 
-  // --- implemented by the ends
-
   virtual void received(std::string_view bytes) = 0;
   virtual Outcome transmit(std::string_view bytes, Peer to) = 0;
   // 0 if the network is up, else errno.
   virtual int probe(const std::vector<OwnAddress>& own) = 0;
   virtual void close_socket() noexcept;
-  // The socket is bound: begins to receive.
   virtual void listen() { begin_to_receive(); }
-
-  // --- for the ends
 
   // Opens the socket without binding it. Throws Error.
   void open_socket(const Endpoint& local, bool v6_only);
@@ -55,8 +50,7 @@ class UdpEnd : public Carrier {
   // The socket is bound: begins to receive, and is up.
   void begin(Handler& handler);
   void hand_over(std::string_view bytes, Peer from);
-  // `standing`: `to` is the destination for everyone, so a failed packet shows a lost network.
-  // `from`: an address of this computer; unspecified: any.
+  // `standing`: to everyone, so a failure shows a lost network. `from`: an own address, or any.
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
                       const asio::ip::address& from = {});
   void set_up(bool up);
@@ -67,7 +61,6 @@ class UdpEnd : public Carrier {
   // Reports that the host is down, once for each reason.
   void tell_why_down(const Problem& problem);
 
-  // The problem of a missing route; `error` is errno.
   Problem no_route(const std::string& subject, int error) const;
 
   asio::io_context& io_;

@@ -102,7 +102,6 @@ HostWatch::Question UdpHost::question() const {
   return [resolve = lookup_.resolve, host = url_.host] { return resolve(host); };
 }
 
-// The next search is for the same board, even if other boards answer.
 void UdpHost::remember(const FoundHost& answer) {
   if (!url_.search) return;
   wanted_.board_id = answer.board_id;

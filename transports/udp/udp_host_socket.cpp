@@ -11,8 +11,7 @@
 namespace r4 {
 namespace {
 
-// The bound sockets of the process, whose boards may have a thread each. Used at open and close
-// only. Never destroyed, because a board may be a static object.
+// Boards may have a thread each. Never destroyed, because a board may be a static object.
 struct Bound {
   std::mutex mutex;
   std::vector<UdpHostSocket*> sockets;

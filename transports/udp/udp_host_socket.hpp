@@ -28,7 +28,6 @@ class UdpHostSocket {
 
   // Port 0: any free port. Fails with already_open if this program has that port for that board.
   asio::error_code bind(const Endpoint& local, const Endpoint& board);
-  // Closes the socket. Can be called twice.
   void close() noexcept;
 
   // True if the kernel has chosen the sending address, which may become invalid.

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The parts of a UDP carrier's URL (udp_carrier.hpp).
 #pragma once
 
 #include <asio/ip/address.hpp>

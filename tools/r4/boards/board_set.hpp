@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The boards of a command on one event loop:
-//     BoardSet boards(options.urls, watching(options.key));
-//     for (SetBoard& each : boards) each.board.on_state(…);
-//     boards.open();
-//     boards.end_by_signal(options.duration);
-//     boards.run();            // until a signal, the duration, or boards.stop()
-//     boards.leave();
-//     boards.require_heard();
+// The boards of a command on one event loop. Order of calls: open(), end_by_signal(), run() until a
+// signal, the duration or stop(), leave(), require_heard().
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -62,8 +56,7 @@ class BoardSet {
   // Ends run(). Callbacks for datagrams from the same read may follow.
   void stop() { io_.stop(); }
   bool stopped() const { return io_.stopped(); }
-  // Call after run(). Disconnects all boards at once and waits up to `limit` for their answers. The
-  // next command then need not wait until the boards time out.
+  // After run(): disconnects all boards and waits up to `limit`, to spare the next command a wait.
   void leave(std::chrono::milliseconds limit = std::chrono::milliseconds{100});
 
   // Throws Error{refused} for the first board that was not heard or whose paths lead to two boards.

@@ -47,7 +47,6 @@ void on_paths(Board& board, Report report) {
   if (board.paths().size() > 1) board.on_path(std::move(report));
 }
 
-// All paths; null for a single path, because the link already reports it.
 inline Json paths_json(const AsyncBoard& board) {
   const std::vector<PathStatus> paths = board.paths();
   if (paths.size() < 2) return nullptr;

@@ -23,7 +23,6 @@ PlainForm plain_form(const std::uint8_t* bytes, std::size_t size, UnpackRoom& ro
 
 // Like add_datagram_json() for a packed datagram; adds `packed`, its packed size in bytes.
 bool add_packed_json(Json& object, const std::uint8_t* bytes, std::size_t size);
-// Like add_datagram_json() for a plain or packed datagram; the first byte decides.
 bool add_bus_json(Json& object, const std::uint8_t* bytes, std::size_t size);
 
 }  // namespace r4::tool

@@ -20,12 +20,10 @@ class BusLog final : BusTransfers::Handler {
 
   explicit BusLog(Print print) : print_(std::move(print)) {}
 
-  // Takes a line that is not empty. Prints everything that the line completes or ends.
   void on_line(std::uint64_t number, std::string_view text);
   void on_long_line(std::uint64_t number, std::uint64_t size);
   void finish();
 
-  // True if a line was damaged, a transfer failed, or a datagram was not valid.
   bool any_bad() const { return damaged_ + failed_ + bad_ != 0; }
 
  private:

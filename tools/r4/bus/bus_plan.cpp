@@ -23,13 +23,11 @@ constexpr double second_ns = 1e9;
 
 using Datagrams = std::vector<std::string>;
 
-// Generates datagrams of a driving machine, or the longest possible. Draws each random number in
-// its own statement, because compilers evaluate arguments in different orders.
+// Draws each random number in its own statement: compilers evaluate arguments in any order.
 class Speaker {
  public:
   explicit Speaker(bool longest) : longest_(longest) {}
 
-  // One state, split into several datagrams if it does not fit into one.
   Datagrams state(FieldSet fields) {
     State state;
     fill(state);
@@ -60,7 +58,6 @@ class Speaker {
     const std::uint32_t t_ms = any();
     return {text(writer.session(session_id).finish(any(), t_ms))};
   }
-  // Alternates motors and servos; the longest command is the stepper's.
   Datagrams command() {
     DatagramWriter writer(buffer_.data(), buffer_.size());
     if (longest_) {

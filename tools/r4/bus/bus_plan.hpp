@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The load of a planned CAN bus, from the bits of all frames of the link.
-//
-// Average: typical datagrams of driving boards, bit by bit. Worst: the longest datagrams with the
-// most stuff bits. A bus with room for these datagrams never delays datagrams by its load.
+// Average: typical datagrams of driving boards. Worst: the longest datagrams with most stuff bits.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Joins recorded CAN frames to datagrams, as boards and hosts do (docs/reference/can.md).
-//
 // Only listens, in the recording's time. Memory is bounded by max_interfaces for any input.
 #pragma once
 
@@ -63,7 +62,6 @@ class BusTransfers {
 
   std::vector<const Lane*> unfinished() const;
   std::uint64_t flow_control() const { return flow_control_; }
-  // Frames of transfers whose beginning was not heard.
   std::uint64_t orphans() const { return orphans_; }
 
  private:

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 commission: checks a board step by step with a person, and learns how it is wired.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -58,7 +57,6 @@ int list_checks(bool json) {
   return 0;
 }
 
-// FILE.html and, beside it, FILE.json.
 class ReportFiles {
  public:
   explicit ReportFiles(const CommissionOptions& options)

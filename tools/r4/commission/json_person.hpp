@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A person who answers through a script. Questions and movements are JSON lines on standard output,
-// answers are JSON lines on standard input.
-//
+// A person who answers through a script: JSON lines of questions on stdout, of answers on stdin.
 //     {"type":"question","check":"osmc 1","topic":"which","text":…,"answer":"choice","choices":[…]}
 //         {"answer":"osmc 1"}   of a choice; a number; true or false
 //         {"action":"skip"}     or repeat, leave: to any question, and in place of the key

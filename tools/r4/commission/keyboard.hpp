@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Standard input byte by byte, without waiting for a line. The destructor restores the settings of
-// a terminal. SIGINT, SIGTERM and SIGHUP end the input, so that moving outputs are stopped in
-// order. Ctrl-Z has no effect.
+// Standard input byte by byte. The destructor restores the terminal's settings. SIGINT, SIGTERM and
+// SIGHUP end the input, so that moving outputs are stopped in order. Ctrl-Z has no effect.
 #pragma once
 
 #include <termios.h>
@@ -23,7 +22,6 @@ class Keyboard {
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;
 
-  // The next byte, `nothing` or `ended`.
   int next(std::chrono::milliseconds timeout);
   // Discards the bytes typed at a terminal, so that they do not answer the next question.
   void forget();

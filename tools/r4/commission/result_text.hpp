@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The result of a check on standard output.
 #pragma once
 
 #include <string>

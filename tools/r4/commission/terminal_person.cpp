@@ -20,7 +20,6 @@ using commissioning::Question;
 constexpr auto repeat_within = 150ms;     // between two repeats
 constexpr auto first_repeat_within = 1s;  // after the key was pressed
 
-// The action of `key`, which answers any question; empty: not an action.
 std::optional<Answer> action_of(int key) {
   Answer answer;
   switch (key) {

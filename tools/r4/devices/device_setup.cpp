@@ -74,7 +74,6 @@ void DeviceSetup::give_up() {
   if (const auto attempt = std::move(attempt_)) attempt->emit(asio::cancellation_type::terminal);
 }
 
-// Starts with the first due device at or after `from`. False if there is none.
 bool DeviceSetup::begin_next(std::size_t from) {
   const Clock::time_point now = Clock::now();
   const auto is_due = [now](const Progress& each) { return !each.done && now >= each.again; };

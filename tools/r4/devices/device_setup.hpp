@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Keeps described devices set up while a command runs: after taking control, and again after a
-// restart of the board, a lost link or a device reset. A failure is reported once and retried every
-// two seconds. A watcher only reports which device was reset.
+// Sets described devices up after taking control, a restart of the board, a lost link or a device
+// reset. A failure is reported once and retried every two seconds. A watcher only reports resets.
 #pragma once
 
 #include <asio/cancellation_signal.hpp>

@@ -15,7 +15,6 @@ namespace r4::tool {
 Findings check_can_kernel(const Machine& machine);
 // The interface may be missing.
 Findings check_can_interface(const Machine& machine, const CanInterface& interface);
-// Frames of other protocols on an id of that board.
 Findings check_foreign_frames(const CanSurvey& survey, const std::string& interface,
                               std::uint8_t node);
 Findings check_can_load(const std::string& interface, double load);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Requests the identity of one board on a CAN bus, only while no other host is heard on the bus.
-// All listeners on the bus receive the answer.
+// Asks a board on a CAN bus for its identity if no other host is heard, as all get the answer.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -67,7 +67,6 @@ std::vector<std::string> ports_of(const Machine& machine, const Discovery& found
   return ports.empty() ? likely_ports(machine) : ports;
 }
 
-// Requests the identity of the boards at `urls`, and at ports with a board's USB id.
 Discovery search_ports(const std::vector<Url>& urls) {
   DiscoveryOptions options;
   options.can = options.udp = false;
@@ -147,7 +146,6 @@ void print(const Findings& findings, bool json) {
   }
 }
 
-// Runs each automatic fix once, and prints its reason. Returns the number of successful fixes.
 int mend(const Findings& findings, bool json) {
   std::vector<std::string> done;
   int mended = 0;

@@ -37,7 +37,6 @@ struct Machine {
   bool exists(const std::string& path) const;
   std::vector<std::string> list(const std::string& path) const;
   std::optional<std::string> link(const std::string& path) const;
-  // The command with sudo, if this user is not root.
   std::string as_root(const std::string& command) const;
 };
 

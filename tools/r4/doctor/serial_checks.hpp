@@ -16,7 +16,6 @@ std::vector<std::string> likely_ports(const Machine& machine);
 Findings check_port_permission(const Machine& machine, const std::string& path);
 // Programs visible to this user. `sharing`: the program that shares the port; 0: none.
 Findings check_port_holders(const Machine& machine, const std::string& path, pid_t sharing);
-// Checks how long an FTDI adapter delays received bytes.
 Findings check_latency_timer(const Machine& machine, const std::string& path);
 // Checks that the installed udev rules equal `rules`, and that ModemManager ignores boards.
 Findings check_udev_rules(const Machine& machine, std::string_view rules);

@@ -39,7 +39,6 @@ struct Pipe {
   std::array<int, 2> ends{};
 };
 
-// Calls `on_text` with the output, errors included, and returns the exit code.
 int run_dfu_util(std::vector<const char*> arguments,
                  const std::function<void(std::string_view)>& on_text) {
   arguments.insert(arguments.begin(), "dfu-util");

@@ -94,8 +94,7 @@ std::optional<Milliseconds> setting_of(const Order& order, std::string_view key)
   return Milliseconds(number_in<std::uint32_t>({value.data(), value.size()}).value_or(0));
 }
 
-// Timeout and heartbeat interval, in any order. Sent in one step, because the board may refuse one
-// setting without the other.
+// Sent in one step, because the board may refuse one setting without the other.
 struct LinkTiming {
   Milliseconds timeout{0};
   Milliseconds heartbeat{0};
@@ -112,8 +111,7 @@ std::optional<LinkTiming> link_timing_at(const std::vector<Order>& orders, std::
   return in_order ? in_order : timing(orders[i + 1], orders[i]);
 }
 
-// No arming is needed, because a typed command is deliberate. If a motor is to turn, the state of
-// relay 1 is requested. Heartbeats are sent often enough for the shortest timeout in the commands.
+// No arming: a typed command is deliberate. Heartbeats suit the shortest timeout in the commands.
 BoardOptions board_options(const SendOptions& options, const std::vector<Order>& orders) {
   BoardOptions board_options = with_key(options.key);
   board_options.session.arming = Arming::off;
@@ -225,7 +223,6 @@ class Sender {
                       orders_[next_]);
   }
 
-  // True if the command turns a motor while relay 1, its supply, is open.
   bool supply_is_missing() const {
     const State& state = board_.state();
     return needs_motor_supply(orders_[next_]) && state.present.has(StateField::relays) &&

@@ -43,8 +43,6 @@ struct UploadOptions {
   bool json = false;
 };
 
-// --- the file
-
 std::uint32_t word(const std::array<unsigned char, 8>& bytes, std::size_t at) {
   return bytes[at] | bytes[at + 1] << 8U | bytes[at + 2] << 16U |
          static_cast<std::uint32_t>(bytes[at + 3]) << 24U;
@@ -78,8 +76,6 @@ void check_image(const std::string& path) {
     refuse("it is not a sketch for the Giga's M7 core");
   }
 }
-
-// --- the port
 
 // The port of `url`. Empty if any board is accepted (serial:auto) and no board runs.
 std::optional<std::string> port_of(const std::string& url) {
@@ -162,8 +158,6 @@ class Port {
   std::string path_;
   int number_;
 };
-
-// --- the steps
 
 void report(const UploadOptions& options, const Json& object, const std::string& text) {
   if (options.json) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Converts frames of CAN buses to records. Each node of each interface is a path,
 // can://can0?node=3, numbered as first heard. A datagram gets the time of its last frame.
-//
 // Events: an emergency stop, "stop can0", without a path; a board that goes safe, "link safe stop".
 #pragma once
 
@@ -29,7 +28,6 @@ class BusRecords final : BusTransfers::Handler {
   void on_frame(std::string_view interface, const CanFrame& frame,
                 const BusTransfers::Place& place);
   void finish();
-  // True if a record or damage was reported.
   bool told() const { return told_; }
   // Reports a path and returns its number. Also for paths of the recording that are not on CAN.
   std::uint16_t add_path(const std::string& url);

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .log, the output of `candump -L`, one frame a line, as a source and a sink:
 //     (1436509052.249713) vcan0 244#2A366C2B
-//
 // Times are relative to 1970; with candump -tz to the first frame, whose time the user may give.
-//
 // A recording holds datagrams, not frames. The sink creates the frames that boards and hosts would
 // send, with flow control, using a CanNode for each end. All frames get the record's time.
 #pragma once

@@ -35,7 +35,6 @@ class CsvSink final : public Sink {
  private:
   const State* read(const Record& record);
   void write_header();
-  // Shared by all paths.
   struct DeviceColumn {
     std::string device;
     std::string value;

@@ -17,8 +17,7 @@
 
 namespace r4::tool {
 
-// Appends a record to `object`: a datagram's `from`, `ok`, `type`, `pnum`, `t`, `fields`, `text`,
-// or an event's `type` and `event`. Bytes that are not printable ASCII become \xNN.
+// Bytes that are not printable ASCII become \xNN.
 void add_record_json(Json& object, const Record& record);
 
 // Adds device values: "devices":{"bno055@0x28":{"accel_x":0.02,…}}; null: not valid.

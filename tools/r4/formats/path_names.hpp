@@ -11,13 +11,11 @@ namespace r4::tool {
 
 class PathNames {
  public:
-  // Once known, the name of a path's board is kept.
   void on_path(const RecordedPath& path) {
     Path& known = paths_[path.number];
     if (known.url == path.url && path.name.empty()) return;
     known = {path.url, path.name};
   }
-  // Name and URL of the path's board; empty if unknown.
   const std::string& name_of(std::uint16_t number) const { return path_of(number).name; }
   const std::string& url_of(std::uint16_t number) const { return path_of(number).url; }
   const std::string& of(std::uint16_t number) const {

@@ -115,7 +115,6 @@ complete -F _r4 r4
   return script;
 }
 
-// Escapes text in brackets or between colons of an _arguments specification.
 std::string zsh_text(std::string_view text) {
   std::string out;
   for (const char c : text) {

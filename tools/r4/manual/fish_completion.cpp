@@ -22,7 +22,6 @@ std::string fish_quoted(std::string_view text) {
   return out + "'";
 }
 
-// The values that fish offers; empty for a free value.
 std::string value_of(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   if (type == file_type) return " -F";
@@ -32,7 +31,6 @@ std::string value_of(const CLI::Option& option) {
   return choices.empty() ? "" : " -a " + fish_quoted(choices);
 }
 
-// One line for each option and positional of a command; for r4 itself `name` is empty.
 std::string lines_of(const CLI::App& command, const std::string& name) {
   const std::string begin =
       fmt::format("complete -c r4 -n {}", fish_quoted(fmt::format("__r4_is '{}'", name)));

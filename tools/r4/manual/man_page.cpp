@@ -76,7 +76,6 @@ std::string today() {
   return fmt::format("{:%Y-%m-%d}", fmt::gmtime(now));
 }
 
-// Keeps indented lines as they are and fills the other lines.
 std::string body_of(const std::vector<std::string>& lines) {
   std::string out;
   bool verbatim = false;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Formats of recordings: detected by content for reading, by the name's ending for writing.
 #pragma once
 
 #include <cstddef>

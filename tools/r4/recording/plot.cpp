@@ -67,7 +67,6 @@ std::string format_of(const std::string& path) {
               "let it end in .svg, .png or .pdf");
 }
 
-// True if the second value of the field is the direction of the first.
 bool has_direction(StateField field) {
   const FieldForm form = kind_row_of(field).form;
   return form == FieldForm::drive || form == FieldForm::bldc;
@@ -197,7 +196,6 @@ void write_all(const FilePointer& memory, const void* bytes, std::size_t size) {
   if (std::fwrite(bytes, 1, size, memory.get()) != size) fail_for_memory();
 }
 
-// The input of plot.py. Includes the spans of boards with curves only.
 FilePointer make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
                       const std::string& title, const std::string& format) {
   Json plan{{"title", printable(title)},
@@ -245,9 +243,8 @@ FilePointer make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
   return input;
 }
 
-// Returns the exit code; empty if `python` does not exist. Runs in /, because Python imports
-// modules and matplotlib reads settings from the working directory, which may hold downloaded
-// files.
+// Returns the exit code; empty if `python` does not exist. Runs in /, because Python reads modules
+// and settings from the working directory, which may hold downloaded files.
 std::optional<int> run_python(const char* python, const FilePointer& plan,
                               const FilePointer& picture) {
   std::rewind(plan.get());

@@ -46,7 +46,6 @@ RecordingOptions limits_of(const RecordOptions& options) {
   return limits;
 }
 
-// Calls on_board() for each board when it is first heard on a bus.
 class BusListener {
  public:
   BusListener(asio::io_context& io, const std::string& interface,

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Subscriptions and services of a board: R4_Command, a topic for each output, cmd_vel, stop, arm.
-//
 // Runs on the boards' loop. Sends the newest setpoint of each channel, in as few datagrams as
-// possible. Drops a sample that is older than 250 ms, or arrives without a link. A lost link ends a
-// running arm(). A stop is never too old.
+// possible. Drops a sample without a link or, except a stop, after 250 ms. A lost link ends arm().
 #pragma once
 
 #include <asio/cancellation_signal.hpp>
@@ -92,7 +90,6 @@ class BoardCommands {
   void warn(const std::string& text) const { say_(LogLevel::warning, text); }
   bool is_stale(const std::string& what, const Origin& origin);
   bool is_overtaken(const Origin& origin) const { return origin.written <= stopped_; }
-  // The reason not to send `command`; empty: none.
   std::string objection_to(const Command& command) const;
   void on_text(const std::string& text, const void* source, const Origin& origin);
   void want(const Command& command, const void* source, const Origin& origin);

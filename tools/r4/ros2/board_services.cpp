@@ -19,7 +19,6 @@ constexpr auto arm_patience = 3000ms;
 constexpr auto stop_patience = 5000ms;
 constexpr const char* overtaken = ": a stop came after it; ask again when the danger is over";
 
-// `what`: a command, a group, or the name of another request.
 template <class What>
 std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, What what,
                                                    BoardCommands::Done done) {

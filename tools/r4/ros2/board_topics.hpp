@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The topics of a board: the paper's three strings (section 8.8), components in ROS units, joints,
 // battery, ranges and diagnostics. After construction only the outbox's thread uses this object.
-//
 // The strings are published with every datagram, joints with every state. A component is published
 // when it changes and once a second, for late subscribers. Missing fields are not repeated.
 #pragma once

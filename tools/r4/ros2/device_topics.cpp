@@ -12,7 +12,6 @@
 namespace r4::tool::ros2 {
 namespace {
 
-// NaN for an invalid measurement.
 double number_of(const Device& device, const State& state, std::string_view value) {
   return device.reading(state, value).number.value_or(std::numeric_limits<double>::quiet_NaN());
 }
@@ -77,8 +76,7 @@ void DeviceTopics::on_state(const State& state, WallTime sampled) {
   for (Topic& topic : topics_) {
     if (!state.present.has(topic.device.field(topic.value))) continue;
     const DeviceReading reading = topic.device.reading(state, topic.value);
-    // For a range, values outside the device's range are published too: nothing within reach, or
-    // too near. A device that is not set up has no valid measurement.
+    // A distance outside the device's range is published too: nothing within reach, or too near.
     const bool told = topic.device.description().role == DeviceRole::range
                           ? topic.device.is_set_up(state).value_or(true) &&
                                 any_number_of(topic.device, state, topic.value).has_value()

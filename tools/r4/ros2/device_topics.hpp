@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measurements of described devices by role: imu, battery, range or joint_states, below the
-// device's name. Each measurement is published once, with the board's time of reading. After
-// construction only the outbox's thread uses this object.
+// Measurements of described devices by role (imu, battery, range, joint_states), each published
+// once, with the board's time. After construction only the outbox's thread uses this object.
 #pragma once
 
 #include <chrono>

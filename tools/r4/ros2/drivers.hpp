@@ -4,11 +4,9 @@
 //      ^                                 ^     has left or is silent for the deadline        |
 //      |                                 +----------- a command that drives -----------------+
 //      +----------------------------- stopped, the board has confirmed it -------------------+
-//
-// A stop might be lost, so it is repeated until confirmed. A stopped output is as in the safe
-// state, except relay 1, the motors' supply, which belongs to arming. A stepper's position is kept
-// for a while, because only one of a state's datagrams has it. The caller passes in the time, which
-// continues while this computer sleeps.
+// A stop may be lost, so it is repeated. A stopped output is as in the safe state, except relay 1,
+// the motors' supply, which belongs to arming. A stepper's position is kept, because only one of a
+// state's datagrams has it. The time is passed in, and continues while this computer sleeps.
 #pragma once
 
 #include <array>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Converts between typed ROS topics and board commands. Values out of range and NaN are not
-// commands. Only the two wheels of cmd_vel are reduced to the range, in proportion.
+// Values out of range and NaN are not commands. Only the wheels of cmd_vel are scaled into range.
 #pragma once
 
 #include <chrono>

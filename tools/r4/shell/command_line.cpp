@@ -60,8 +60,7 @@ constexpr std::array subcommands = std::to_array<Subcommand>({
     {"commission", add_commission},
 });
 
-// Adds only the subcommand that the first argument names, else all subcommands, because declaring
-// all options takes longer than a stop. completion and man describe all subcommands.
+// Adds only the subcommand named by the first argument: declaring all takes longer than a stop.
 void add_subcommands(CLI::App& root, Action& chosen, std::string_view first) {
   const bool tells_of_all = first == "completion" || first == "man";
   for (const Subcommand& each : subcommands) {

@@ -16,7 +16,6 @@ std::string command_table();
 
 void set_help_layout(CLI::App& root);
 
-// The option or subcommand of `command` with the name closest to `word`; empty if none is close.
 std::string nearest_name(const CLI::App& command, const std::string& word);
 
 }  // namespace r4::tool

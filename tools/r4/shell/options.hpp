@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Options that several subcommands share. Parsing a wrong value throws Error{usage}. The templates
-// of CLI11 that create options are compiled once, in options.cpp, to shorten the build.
+// Options that several subcommands share. Parsing a wrong value throws Error{usage}.
 #pragma once
 
 #include <chrono>

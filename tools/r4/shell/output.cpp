@@ -65,7 +65,6 @@ void print_raw(std::string_view text) {
 
 void print_text(std::string_view text) { print_raw(printable_lines(text)); }
 
-// Does not throw: a full disk or a closed stream must not end a command.
 void print_trouble(std::string_view text) {
   const std::string line = printable(text) + '\n';
   static_cast<void>(std::fwrite(line.data(), 1, line.size(), stderr));

@@ -13,7 +13,6 @@
 namespace r4::tool {
 namespace {
 
-// Defaults to 80x24 if the terminal does not report its size.
 winsize terminal_size() {
   winsize size{};
   if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) size.ws_col = 80;

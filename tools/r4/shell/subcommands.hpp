@@ -44,7 +44,6 @@ void add_man(CLI::App& root, Action& chosen);
 CLI::App* add_subcommand(CLI::App& root, const char* name, const char* meaning,
                          const std::string& footer, std::function<void()> on_chosen);
 
-// Calls `action` with `options`, which exist as long as the command line.
 template <class Options>
 CLI::App* add_subcommand(CLI::App& root, Action& chosen, const char* name, const char* meaning,
                          const std::string& footer, std::shared_ptr<Options> options,

@@ -21,7 +21,6 @@ class ChildBoard {
 
   // `on_event` gets each printed object, on the io_context's thread. Throws Error.
   ChildBoard(asio::io_context& io, const std::string& url, OnEvent on_event);
-  // Ends the process and waits for its end.
   ~ChildBoard();
   ChildBoard(const ChildBoard&) = delete;
   ChildBoard& operator=(const ChildBoard&) = delete;

@@ -132,7 +132,6 @@ std::string virtual_can() {
   return {};
 }
 
-// The stages possible on this machine. `missing`: why CAN is left out.
 std::vector<Stage> stages(std::optional<Problem>& missing) {
   std::vector<Stage> all{
       {"in process", "Within this program (sim:)", ""},

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The demonstration on one board: connect, stream, command, silence, safe state, recovery, stop,
-// clear (paper sections 4.3 and 4.4). The first step that fails ends the demonstration.
+// The demonstration on one board (paper sections 4.3 and 4.4). The first step that fails ends it.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -78,7 +77,6 @@ class Story {
   std::string state_bytes_;
   Clock::time_point state_came_;
   std::uint64_t states_ = 0;
-  // The board's newest heartbeat that reported a safe state.
   std::string safe_bytes_;
   std::uint32_t safe_t_ms_ = 0;
   std::optional<CommandResult> ended_;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads lines from standard input: a terminal, a pipe or a file.
 #pragma once
 
 #include <asio/io_context.hpp>

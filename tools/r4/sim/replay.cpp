@@ -125,7 +125,6 @@ class Replay : private Carrier::Handler {
     io_.stop();
   }
 
-  // False at the end of the file.
   bool read_on() {
     try {
       return records_.read_on();

@@ -78,7 +78,6 @@ Settings read_settings(const std::vector<std::string>& texts) {
   return settings;
 }
 
-// A board of this process: its URLs and its answer to Q:ID.
 struct Plan {
   std::vector<std::string> urls;
   std::string id;

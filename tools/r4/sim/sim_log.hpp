@@ -43,9 +43,7 @@ class SimLog {
   // Call before the board's start().
   void watch(const sim::SimulatedBoard& board) { board_ = &board; }
   void tell_sensors();
-  // Call at the end for each transport: prints its counters.
   void on_end(const Carrier& carrier);
-  // Call at the end: prints the counters of a deliberately impaired link.
   void on_impairment(const ImpairedCarrier& link);
 
  private:

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 bench: measures the quality of the link to a board, in four phases:
-//     wait for control | listen: rate, loss, jitter | ask: round trips | command: confirmations
-//                             2/5 of the time             2/5                 1/5
+// r4 bench: waits for control, then listens (2/5 of the time), asks (2/5) and commands (1/5).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -94,7 +92,6 @@ class Bench {
     boards_.run();
   }
 
-  // A received state proves control.
   void connect() {
     Subscription waiting = board_.on_state([this](const State&, const Datagram&) {
       if (board_.in_control()) boards_.stop();
@@ -122,7 +119,6 @@ class Bench {
     if (states_ == 0) throw Error(explain(board_.name(), board_.link()));
   }
 
-  // Within a burst, each answer triggers the next question.
   void ask() {
     running_ = true;
     ask_next(burst);

@@ -60,7 +60,6 @@ std::string text_of(const Field& field) {
                      std::string_view(field.values().data(), field.values().size()));
 }
 
-// Throws if a board would not execute these commands together.
 void check_all(const Datagram& datagram) {
   Setpoints group;
   for (const Field& field : datagram) {

@@ -135,7 +135,6 @@ class LiveView final : public MonitorView {
     }
   }
 
-  // In columns, read downwards.
   void add_fields(std::vector<std::string>& lines, std::size_t columns) const {
     const std::size_t rows = (fields_.size() + columns - 1) / columns;
     for (std::size_t row = 0; row < rows; ++row) {
@@ -150,7 +149,6 @@ class LiveView final : public MonitorView {
   const AsyncBoard& board_;
   const Clock::time_point start_ = Clock::now();
   std::vector<std::pair<std::string, std::string>> fields_;
-  // By slot and name of the device; values by name.
   std::map<std::pair<int, std::string>, std::map<std::string, std::string>> readings_;
   std::deque<std::string> notes_;
   ChipFault fault_;

@@ -162,7 +162,6 @@ class Monitor {
     board.async_release_control(release_time, [](const CommandResult&) {});
   }
 
-  // Reports each reading once, and again after a restart of the board.
   void tell_readings(const ReceivedState& state) {
     for (const Device& device : devices_) {
       const std::vector<DeviceValue>& values = device.description().values;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `r4 monitor can://can0` without a node: listens to every board on the bus.
 #pragma once
 
 #include <cstdint>

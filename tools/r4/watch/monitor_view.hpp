@@ -43,7 +43,6 @@ class MonitorView {
   virtual void on_bad_datagram(const ReadResult&, std::string_view) {}
   virtual void on_link(const LinkStatus&) {}
   virtual void on_event(const CarrierEvent&) {}
-  // With several paths: a path has started or stopped carrying.
   virtual void on_path(const PathStatus&) {}
   // Ten times a second.
   virtual void on_tick() {}
@@ -51,7 +50,6 @@ class MonitorView {
 
 // One JSON object a line: type, transport, pnum, t, fields. `lines` must outlive the view.
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board, LineWriter& lines);
-// One line for each state, for pipes.
 std::unique_ptr<MonitorView> make_plain_view(LineWriter& lines);
 std::unique_ptr<MonitorView> make_live_view(const AsyncBoard& board);
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A state as a row of numbers, with the field and unit of each column.
 #pragma once
 
 #include <array>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Decides which browser controls the boards, and for how long: without a browser no motor turns.
 //      free --take()--> held --release() of its holder, or expired()--> leaving --left()--> free
-//
 // The holder sends alive() ten times a second, with the newest server time it has received. Control
 // expires when the newest echoed time is `limit` old, so silence or delayed messages end control.
 // Messages arrive in order, so no older command is accepted. The caller passes in the time.
@@ -23,15 +22,12 @@ class Control {
   bool is_held_by(Client client) const { return holder_ == client; }
   bool leaving() const { return leaving_; }
 
-  // False if another client holds control or is leaving it.
   bool take(Client client, Time now);
-  // False if the client was not the holder.
   bool release(Client client);
   // Call when all boards have been left.
   void left() { leaving_ = false; }
   // False if `echoed` is not newer than before.
   bool alive(Client client, Time echoed, Time now);
-  // When control expires, unless alive() extends it.
   std::optional<Time> deadline() const;
   bool expired(Time now) const { return holder_ && now >= *deadline(); }
 

@@ -27,7 +27,6 @@ class Foxglove {
   Foxglove(std::size_t boards, std::string session, Send send);
 
   void on_open(ClientId client);
-  // False if the text is not a message of the protocol.
   bool on_message(ClientId client, const std::string& text);
   void on_closed(ClientId client);
 

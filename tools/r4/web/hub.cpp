@@ -91,8 +91,6 @@ Control::Time Hub::now() const {
   return std::chrono::duration_cast<Control::Time>(BootClock::now() - began_);
 }
 
-// --- on the server's thread
-
 void Hub::on_open(ClientId client, Protocol protocol) {
   if (protocol == Protocol::foxglove) return foxglove_.on_open(client);
   asio::post(io_, [this, client] { greet(client); });

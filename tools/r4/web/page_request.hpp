@@ -18,7 +18,6 @@ struct PageRequest {
   std::string command;
 };
 
-// Empty unless the text is a valid message with all members in range.
 std::optional<PageRequest> page_request(const std::string& text);
 
 }  // namespace r4::tool::web

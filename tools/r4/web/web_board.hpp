@@ -16,7 +16,6 @@
 
 namespace r4::tool::web {
 
-// How long a farewell is repeated without an answer.
 constexpr std::chrono::milliseconds farewell_time{200};
 
 class WebBoard {

@@ -30,7 +30,6 @@ class WebRecording {
   // Blocks until the disk is done.
   ~WebRecording();
 
-  // No effect while recording.
   void begin(Client client);
   void end();
   bool is_of(Client client) const { return stage_ != Stage::off && client_ == client; }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 wiring: files that describe how a board is wired.
 #include "r4link/wiring/wiring.hpp"
 
 #include <fmt/format.h>
@@ -42,7 +41,6 @@ void give(const std::string& url, const Wiring& wiring) {
   Board(url).give_wiring(wiring, patience);  // the safe state does not matter
 }
 
-// A file, the URL of a board, or the plan.
 Wiring wiring_of(const std::string& source) {
   if (is_url(source)) return ask(source).wiring;
   return source == "plan" ? plan_wiring() : load_wiring(source);

@@ -30,7 +30,6 @@ constexpr std::uint32_t fd_crc_field_bits(std::uint8_t size) {
                                 : (stuff_count_bits + 21) + 1 + (stuff_count_bits + 21) / 4;
 }
 
-// Counts the bits of a stuffed part as sent, and computes the classic CRC.
 class StuffedBits {
  public:
   void bit(std::uint32_t value) {

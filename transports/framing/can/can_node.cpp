@@ -12,7 +12,6 @@
 namespace r4 {
 namespace {
 
-// The meaning of an emergency frame without a number.
 constexpr Text stop_datagram("E:STOP;^0x506f0fbe^");
 // The meaning of a watch frame: 5 Hz. Even a slow bus carries the states as text, 24 frames each.
 constexpr Text watch_datagram("W:5;^0x414648b3^");

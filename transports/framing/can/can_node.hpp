@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The traffic between a board and its hosts on a CAN bus (docs/reference/can.md), at either end:
-// whole datagrams on one side, frames on the other.
+// The traffic of a board and its hosts on a CAN bus (docs/reference/can.md), at either end:
 //     dialogue    host to board, and the board's answers (N, I): ISO-TP with flow control
 //     telemetry   the board's states and heartbeats, for all listeners: ISO-TP without flow control
 // Three raw frames are added: the emergency stop, which the board's end turns into E:STOP; the
-// reason when a board goes safe; a watcher's request for states. Datagrams are received plain and
-// packed, and sent packed on request. A board answers a plain-text host in plain text.
-// Driven like its ISO-TP ends (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. The caller's queue
-// chooses the next datagram. Not thread-safe.
+// reason when a board goes safe; a watcher's request for states. Plain and packed datagrams are
+// received. Driven like its ISO-TP ends (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. The caller's
+// queue chooses the next datagram. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -45,7 +43,6 @@ class CanNode {
   // Sends packed datagrams; a board sends plain if its host's newest datagram was plain.
   void use_packed_form(bool wanted) { packed_ = wanted; }
 
-  // A host's datagrams go to the dialogue, a board's by their kind.
   CanLane lane_of(Text datagram) const;
   bool idle(CanLane lane) const;
   // Copies a datagram. False without effect if its lane is busy, or the datagram empty or too long.
@@ -53,8 +50,7 @@ class CanNode {
 
   // Writes the most urgent frame, until frame_sent() or a more urgent frame. False if none.
   bool offer(std::uint32_t now_us, CanFrame& frame);
-  // As offer(), but only frames that may overtake all accepted frames: flow control, for which the
-  // other end waits, and the reason for going safe.
+  // As offer(), but only frames that may overtake: flow control, and the reason for going safe.
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
   void frame_sent(std::uint32_t now_us);
   // True for a frame of this end's dialogue, which the other end answers with flow control.
@@ -63,7 +59,6 @@ class CanNode {
   void wait_anew(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
   // Returns the datagram that the frame completes, valid until the next call; otherwise empty.
   Text on_frame(const CanFrame& frame, std::uint32_t now_us);
-  // True if the other end sends the next frame of a transfer, possibly at once.
   bool awaits_frame() const {
     return telemetry_in_.awaits_consecutive() || dialogue_in_.awaits_consecutive() ||
            dialogue_out_.awaits_flow_control();

@@ -4,7 +4,6 @@
 //     first frame        1L LL data…            8–4095 bytes; 10 00 LL LL LL LL data… for more
 //     consecutive frame  2S data…               S counts 1 … 15, 0, 1 …
 //     flow control       3F BS ST               F: 0 clear to send, 1 wait, 2 overflow
-//
 // Both ends are driven frame by frame and own no clock, no heap and no bus:
 //     on_frame(frame, now)   a frame arrived; frames of other ids are ignored
 //     offer(now, frame)      true if there is a frame to send; the same frame is offered until …
@@ -24,7 +23,6 @@
 
 namespace r4 {
 
-// "Ends": the error ends a transfer. "Ignored": the frame has no effect.
 enum class IsotpError : std::uint8_t {
   none,
   send_timeout,           // ends: the bus did not accept the frame within N_As or N_Ar (9.8.2)
@@ -40,10 +38,8 @@ enum class IsotpError : std::uint8_t {
   malformed,         // ignored: length or type not valid for any frame (9.6.2.2, 9.6.3.2)
 };
 
-// For a log: "no flow control in time (N_Bs)".
 Text to_text(IsotpError error);
 
-// The ids of a transfer, the same at both ends, and the format of sent frames.
 struct IsotpChannel {
   std::uint32_t id = 0;               // single, first and consecutive frames; 11 bits
   std::uint32_t flow_control_id = 0;  // the receiver's flow control; 11 bits
@@ -81,7 +77,6 @@ constexpr std::uint32_t max_short_first_frame = 4095;  // FF_DL in 12 bits; 32 b
 
 namespace isotp_frame {
 
-// True for a data frame with that 11-bit id.
 constexpr bool is_for(const CanFrame& frame, std::uint32_t id) {
   return frame.id == id && !frame.extended && !frame.remote;
 }

@@ -217,7 +217,6 @@ IsotpError IsotpReceiver::fail(IsotpError error, std::uint32_t& counter) {
   return error;
 }
 
-// Waits for the next transfer, and owes no flow control.
 void IsotpReceiver::rest() {
   state_ = State::idle;
   status_ = IsotpFlowStatus::clear_to_send;

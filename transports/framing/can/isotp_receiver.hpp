@@ -8,7 +8,6 @@
 //       |                 '---------------------------------------------------------'   frame
 //       |                          first frame, listen only                         ^
 //       '---------------------------------------------------------------------------'
-//
 //     receiving -> idle: the last frame (a datagram), a wrong sequence number, N_Cr
 //     offered   -> idle: N_Ar; the overflow was sent
 //     owing     -> idle: too many waits
@@ -21,12 +20,11 @@
 //     timer.arm(receiver.deadline());
 // A delivered datagram equals the sent datagram. Any error is counted and delivers nothing. There
 // is one exception, because ISO-TP distinguishes frames by four bits only. A frame 16 (32, 48 …)
-// places later in the same stream is accepted as the expected frame.
-// Loss alone causes the exception only without flow control and only across two transfers. The end
-// of one transfer, the first frame of the next, and as many further frames as the numbers need must
-// be lost, all within N_Cr. Then the datagram mixes both transfers. If both have n frames, n (or
-// n - 16, n - 32 …, but at least 2) frames in a row must be lost. Examples: 4 if both have 4
-// frames, 9 if both have 25, 2 if both have 18. An N_Cr below the pause of transfers prevents this.
+// places later in the same stream is accepted as the expected frame. Loss alone causes the
+// exception only without flow control and only across two transfers. The end of one transfer, the
+// first frame of the next, and as many further frames as the numbers need must be lost, all within
+// N_Cr. Then the datagram mixes both transfers. If both have n frames, n (or n - 16, n - 32 …, but
+// at least 2) frames in a row must be lost. An N_Cr below the pause of transfers prevents this.
 // With flow control, a flow control must arrive after N_Bs, when the sender has begun another
 // transfer, whose first frame must also be lost. The datagram's CRC detects both cases.
 #pragma once
@@ -43,8 +41,7 @@ struct IsotpReceiverOptions {
   std::uint8_t block_size = 0;    // BS: frames between two flow controls; 0: all in one block
   std::uint8_t stmin = 0;         // STmin byte, see stmin_from_us()
   std::uint32_t n_ar_us = 20000;  // the longest offer of a flow control
-  // The sending process may be delayed, and so may the system's report of an arrival. A new first
-  // frame ends a transfer at any time.
+  // Long: the sender or the report of an arrival may be late. A first frame ends a transfer anyway.
   std::uint32_t n_cr_us = 100000;
   std::uint16_t max_waits = 10;       // N_WFTmax: waits in a row while hold(true)
   std::uint32_t wait_gap_us = 10000;  // between waits: less than the sender's N_Bs

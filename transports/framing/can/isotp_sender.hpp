@@ -12,10 +12,8 @@
 //        overflow, reserved flow status,         |   '----'
 //        N_WFTmax, N_Bs                          v
 //                                               idle
-//
-// The caller's bytes must not change while busy(); they are copied only into frames. Frames leave
-// in order, and none is skipped. Without flow control (telemetry for any number of listeners), the
-// frames follow each other at `separation_us`.
+// The caller's bytes must not change while busy(). Without flow control (telemetry for any number
+// of listeners), the frames follow each other at `separation_us`.
 //     sender.begin(bytes, size, now);
 //     sender.poll(now);
 //     while (sender.offer(now, frame) && bus.push(frame)) sender.frame_sent(now);

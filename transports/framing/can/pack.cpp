@@ -45,7 +45,6 @@ unsigned digits_of(std::uint64_t value) {
   return value == 0 ? 0 : (67 - static_cast<unsigned>(__builtin_clzll(value))) / 4;
 }
 
-// True for a whole number without leading zeros, as writers print it.
 bool parse_plain(Text text, std::uint64_t& out) {
   return !text.empty() && (text[0] != '0' || text.size() == 1) && parse_number(text, out);
 }
@@ -171,8 +170,7 @@ unsigned digit_of(char c) {
   return c == '.' ? digit_point : c == '-' ? digit_minus : no_digit;
 }
 
-// The end of a run of bytes: where three digits follow, or digits to the end. Such digits cost less
-// than a new run of bytes.
+// The end of a run of bytes: three digits, or digits to the end, cost less than another run.
 const char* end_of_bytes(const char* at, const char* end) {
   const char* const limit =
       end - at > static_cast<std::ptrdiff_t>(longest_bytes) ? at + longest_bytes : end;
@@ -293,7 +291,6 @@ bool is_heartbeat_of(const Field& field, unsigned code) {
   return field.name() == Text("H") && field.values() == words[code].word();
 }
 
-// Removes the fields of the packed head from [fields, end), and reads their numbers.
 Layout choose_layout(Fields& fields, const char*& end, Numbers& numbers) {
   Fields after = fields;
   const Field first = after.next();

@@ -61,8 +61,6 @@ constexpr Sizes sizes_of(Layout layout, unsigned size) {
   return layout == Layout::of_session ? session_sizes : sizes[size];
 }
 
-// --- digits with a meaning
-
 constexpr unsigned digit_escape = 0xF;  // in place of a value: text follows
 // Text: 0-9 are themselves.
 constexpr unsigned digit_point = 0xA;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The words with a code in the packed form, and the form of each field's values: the tables of
-// docs/reference/packed.md, version 1. After the first release, a change needs a new version.
+// Tables of docs/reference/packed.md, version 1. After the first release, a change needs version 2.
 #pragma once
 
 #include <cstdint>

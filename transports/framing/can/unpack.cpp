@@ -53,7 +53,6 @@ class Characters {
     std::memcpy(at_, begin, size);
     at_ += size;
   }
-  // The word; if `colon` is 1, also its colon.
   void put(const PackedWord& word, std::size_t colon) {
     const std::size_t size = word.size + colon;
     if (room() >= sizeof word.text) {  // usual case: one copy of a fixed size
@@ -180,7 +179,6 @@ bool take_session(Digits& digits, SessionId& sid) {
   return sid != no_session;
 }
 
-// Reads a value in its form, or as text after an F.
 bool take_value(Digits& digits, PackedForm form, Characters& out) {
   unsigned first = 0;
   std::uint64_t value = 0;

@@ -47,8 +47,7 @@ address_v4 address_of(const sockaddr* system) {
   return address_v4(ntohl(in.sin_addr.s_addr));
 }
 
-// A socket at this computer's address in a network, which sends by the network's own interface,
-// even if two interfaces are in one network. If it is not open, `network.trouble` has the reason.
+// Sends by the network's own interface. If it is not open, `network.trouble` has the reason.
 FileDescriptor open_in(Network& network) {
   FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int on = 1;
@@ -135,7 +134,6 @@ class Round {
     }
   }
 
-  // Keeps each address once, with its first answer.
   void keep(AnsweredBoard board) {
     if (!called_.empty() && board.board_id != called_ && board.name != called_) {
       others_.insert(board.board_id);
@@ -284,8 +282,7 @@ FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted) {
   std::vector<AnsweredBoard> meant = result.boards;
   if (!wanted.called.empty()) meant = called(result.boards, wanted.called);
   if (!wanted.board_id.empty()) {
-    // If several boards have that name, choose the board that was found before. If the URL names no
-    // board, another board does not replace the board that was found before.
+    // Only the board found before: among boards of one name, and if the URL names no board.
     std::vector<AnsweredBoard> same = meant;
     std::erase_if(same,
                   [&](const AnsweredBoard& each) { return each.board_id != wanted.board_id; });

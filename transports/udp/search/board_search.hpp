@@ -2,7 +2,6 @@
 // Finds the boards on this computer's networks by IPv4 broadcast. A board answers every host.
 //     on each network:  socket at our address, any free port --- Q:ID, 3 times ---> broadcast:2018
 //                                     <--- I:R4,…;NAME:…;BUSY:… --- each board, from its :2018
-//
 // One search takes half a second, sends three packets a network, and keeps at most `most_boards`
 // answers. The answers are not signed, so any program on the network can answer as any board. The
 // link and its keys decide which commands are accepted, not the search. Broadcast does not pass a
@@ -72,7 +71,6 @@ std::vector<AnsweredBoard> called(const std::vector<AnsweredBoard>& boards,
 std::string url_of(const AnsweredBoard& board, const std::vector<AnsweredBoard>& boards,
                    std::uint16_t port);
 
-// Searches. Returns the board's addresses, or the problem if no board or several answered.
 FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted);
 
 }  // namespace r4

@@ -64,7 +64,6 @@ class HostWatch {
   void stop();
 
   void set_known(bool known) { known_ = known; }
-  // True if heard() has an effect.
   bool listens() const { return !heard_; }
   void heard() { heard_ = true; }
 

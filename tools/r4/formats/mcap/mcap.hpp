@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Records of an MCAP file (mcap.dev/spec, version 0), and r4's use of them.
-//
 // Each board has a topic, /left-arm or /board1, whose messages are its records as JSON, as in
 // .jsonl. Topic /r4log holds the lines of the native format that belong to no board. In file order
 // the messages contain the whole recording, so the native file can be restored byte by byte.

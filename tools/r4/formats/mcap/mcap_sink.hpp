@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .mcap: a recording for Foxglove, Lichtblick, PlotJuggler and `mcap`, in chunks compressed by
-// zstd, with all indexes and checksums. Only the chunk index at the end of the file grows in
-// memory: a few hundred bytes for each MiB of JSON.
+// .mcap for Foxglove, Lichtblick, PlotJuggler and `mcap`, in zstd chunks with all indexes and
+// checksums. Only the chunk index at the end grows in memory: hundreds of bytes for a MiB of JSON.
 #pragma once
 
 #include <compare>
@@ -80,7 +79,6 @@ class McapSink final : public Sink {
   std::uint64_t chunk_first_ns_ = 0, chunk_last_ns_ = 0;
   bool chunk_has_messages_ = false;
 
-  // For the summary section:
   std::string schemas_, channel_records_, chunk_indexes_, offsets_;
   std::uint64_t messages_ = 0;
   std::uint32_t chunks_ = 0;

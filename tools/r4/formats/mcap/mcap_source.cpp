@@ -76,7 +76,6 @@ void McapSource::take() {
   waiting_.erase(0, waiting_.size() - rest.size());
 }
 
-// Takes the next record and returns its size in bytes; 0: more bytes are needed.
 std::size_t McapSource::take_next(std::string_view bytes) {
   if (part_ == Part::magic) {
     if (!mcap::magic.starts_with(bytes.substr(0, mcap::magic.size()))) fail_as_none();
@@ -118,7 +117,6 @@ std::size_t McapSource::take_next(std::string_view bytes) {
   return mcap::record_head + content.size();
 }
 
-// Skips to the next compressed chunk.
 std::size_t McapSource::search(std::string_view bytes) {
   const std::size_t mark = std::min(bytes.find(zstd_mark), bytes.find(lz4_mark));
   if (mark == std::string_view::npos) {

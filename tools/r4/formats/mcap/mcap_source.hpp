@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads .mcap files sequentially, without the index. After a damaged chunk it continues with the
-// next chunk. Another tool may have copied the file: with another chunk size, compression or
-// profile, without some topics, or with foreign topics, which are ignored.
+// Reads .mcap files without the index. Continues after a damaged chunk. A copy by another tool may
+// have another chunk size, compression or profile, lack topics, or have foreign topics.
 #pragma once
 
 #include <cstdint>

@@ -6,7 +6,6 @@
 
 namespace r4::tool::mcap {
 
-// Records of a board: names every state field, with its unit.
 std::string record_schema_text();
 std::string line_schema_text();
 std::string link_schema_text();

@@ -198,7 +198,6 @@ void PacketRecords::on_line(const PacketInterface& interface, const Packet& pack
   if (problem != nullptr) damage(packet, problem);
 }
 
-// A datagram from PcapngSink, on the path that `interface` names.
 void PacketRecords::on_own(const PacketInterface& interface, const Packet& packet) {
   const auto path = std::string_view(interface.description).substr(path_interface.size());
   Udp udp;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Converts packets of a network or a CAN bus to records: UDP datagrams to and from a board's port,
 // CAN frames of boards, and PcapngSink's output. A capture without any record is refused.
-//
 // A packet captured on two interfaces of the computer (tcpdump -i any) is reported once.
 #pragma once
 
@@ -36,7 +35,6 @@ struct Packet {
 
 class PacketRecords {
  public:
-  // `name` is used in errors; `port` is the boards' UDP port.
   PacketRecords(RecordingVisitor& visitor, std::string name, std::uint16_t port)
       : visitor_(visitor),
         name_(std::move(name)),
@@ -87,7 +85,6 @@ class PacketRecords {
   std::optional<ByteOrder> cooked_order_;  // byte order of CAN ids in cooked captures, if known
   std::array<Seen, 64> seen_;
   std::size_t next_seen_ = 0;
-  // For the error if no data of a board is found:
   bool told_ = false;
   Kind kind_ = Kind::none;
   std::uint64_t packets_ = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .pcapng for Wireshark (draft-ietf-opsawg-pcapng), from which the native file can be restored.
-//
 // A datagram becomes a UDP packet on its path's interface, "r4log 1 path N", whatever its
 // transport. The board's address comes from its URL, else it is invented: 198.18.0.0 + N for the
 // board, 198.19.0.1 for the host (RFC 2544). Everything else is a native line on the interface

@@ -16,7 +16,6 @@ namespace r4::tool::ros2 {
 class Discovery {
  public:
   using Tell = std::function<void(const Announced& announced)>;
-  // `own`: our participants, which are not reported.
   Discovery(const std::vector<dds_entity_t>& own, Tell tell);
 
   // Call look() when one of these has data.

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Readers and writers announced by a participant, and whether two of them match.
 #pragma once
 
 #include <dds/dds.h>

@@ -35,7 +35,6 @@ class Entity {
   dds_entity_t entity_ = 0;
 };
 
-// Global identity of a participant, reader or writer.
 using EntityId = std::array<std::uint8_t, 16>;
 EntityId id_from(const dds_guid_t& guid);
 EntityId id_of(dds_entity_t entity);

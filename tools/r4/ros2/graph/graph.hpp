@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Our part of the ROS 2 graph: nodes with their topics and services.
-//
 // Cyclone DDS numbers a participant's entities with 14 bits, so 64 nodes share a participant.
-// Create nodes before list_nodes(). Readers may also be created later, on the reading thread.
-// leave() removes all nodes at once, and the destructor waits until the removal is sent. A killed
-// process stays listed for 10 s.
+// Create nodes before list_nodes(); readers also later, on the reading thread. leave() removes all
+// nodes at once, and the destructor waits until that is sent. A killed process is listed for 10 s.
 #pragma once
 
 #include <chrono>
@@ -87,7 +85,6 @@ class Graph {
     std::string name;
     OtherType other_type;
   };
-  // By DDS name. nullptr: not used by our nodes.
   const OwnTopic* own_topic(const std::string& topic) const;
 
   const std::vector<Endpoint>& publishers() const { return publishers_; }

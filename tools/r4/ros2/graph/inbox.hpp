@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads samples from the graph on its own thread and passes them to the boards' loop.
-//
-// Newer samples of a subscription replace waiting samples. The loop takes samples at once, but on
-// average at most every 10 ms, so a flood delays heartbeats by only a few turns. Urgent samples,
-// which are stops, are taken immediately.
+// Newer samples of a subscription replace waiting samples. On average the loop takes samples at
+// most every 10 ms, so a flood delays heartbeats by only a few turns. Stops are taken at once.
 #pragma once
 
 #include <dds/dds.h>
@@ -48,13 +46,11 @@ class Inbox {
   struct Subscription {
     dds_entity_t reader = 0;
     std::size_t room = 1;  // samples that may wait; the oldest is dropped
-    // On the reading thread: empty for a malformed sample.
+    // `read` (empty: malformed) and `urgent` (true: take it immediately) run on the reading thread.
+    // `take` and `left` (after a publisher has left: the remaining publishers) run on the loop.
     std::function<std::optional<Value>(const Message&)> read;
-    // On the reading thread: true if it must be taken immediately.
     std::function<bool(const Value&)> urgent;
-    // On the loop.
     std::function<void(const Value&, const Origin&)> take;
-    // On the loop, after a publisher has left: the remaining publishers.
     std::function<void(const std::vector<std::uint64_t>&)> left;
   };
   // Call before start(), or on the reading thread.

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Supports `ros2 node list`: on ros_discovery_info each participant publishes its nodes with their
-// readers and writers. An id has 24 bytes up to Humble and 16 since Iron, under the same type name,
-// and the wrong size makes a receiver throw. So nothing is published until the type hash of another
-// participant's writer shows its release. ROS does not support a graph of two releases, so the
-// first release found is used.
+// Supports `ros2 node list`: each participant publishes its nodes with their readers and writers on
+// ros_discovery_info. An id has 24 bytes up to Humble and 16 since Iron, under one type name, and
+// the wrong size makes a receiver throw. So nothing is published until the type hash of another
+// participant's writer shows its release. ROS does not support two releases: the first counts.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +25,6 @@ struct Node {
 };
 
 enum class Release : std::uint8_t { before_iron, since_iron };
-// The release of ROS_DISTRO; empty for an empty value.
 std::optional<Release> release_of(const std::string& distro);
 
 class NodeListing {

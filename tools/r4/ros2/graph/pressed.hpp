@@ -13,7 +13,6 @@ namespace r4::tool::ros2 {
 
 class Pressed {
  public:
-  // True if newly pressed.
   bool on(const EntityId& who, bool pressed) {
     const bool was = std::erase(pressed_, who) != 0;
     if (!pressed) return false;

@@ -21,7 +21,6 @@ ListenAddress listen_address(const std::string& text);
 // NAME or NAME:PORT of --host. Throws Error{usage}.
 std::string host_name(const std::string& text);
 
-// True for 127.0.0.1, ::1 and localhost, which other computers cannot reach.
 bool is_loopback(std::string_view host);
 
 // 128 random bits in hexadecimal.

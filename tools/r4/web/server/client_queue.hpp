@@ -23,7 +23,6 @@ struct Outgoing {
 class ClientQueue {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  // Older states are not worth sending.
   static constexpr std::chrono::milliseconds oldest_state{250};
   static constexpr std::size_t most_state_bytes = std::size_t{512} << 10;
   static constexpr std::size_t most_other_bytes = std::size_t{256} << 10;
@@ -32,7 +31,6 @@ class ClientQueue {
   std::optional<Outgoing> pop();
   bool empty() const { return states_.empty() && others_.empty(); }
   std::size_t bytes() const { return state_bytes_ + other_bytes_; }
-  // States lost since the last call.
   std::uint64_t take_lost();
 
  private:

@@ -23,7 +23,6 @@ struct PageFile {
   std::string gzip;
 };
 
-// By path: "/index.html".
 using PageFiles = std::map<std::string, PageFile, std::less<>>;
 PageFiles page_files();
 PageFile page_file(std::string_view name, std::string_view content);

@@ -33,7 +33,6 @@ struct ServerOptions {
 class ServerEvents {
  public:
   virtual void on_open(ClientId client, Protocol protocol) = 0;
-  // A text message. The client's next message arrives after Server::read_on().
   virtual void on_message(ClientId client, Protocol protocol, std::string text) = 0;
   virtual void on_closed(ClientId client, Protocol protocol) = 0;
   // Reply by Server::set_metrics(). Not called again until `metrics_age` after the reply.
@@ -54,7 +53,6 @@ class Server {
   static constexpr double message_burst = 400;
   static constexpr double messages_a_second = 200;
 
-  // Requests for /metrics within this time get the same answer.
   static constexpr std::chrono::milliseconds metrics_age{200};
 
   // Listens. Clients are served after start(). Throws Error.

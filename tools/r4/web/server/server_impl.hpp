@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The inside of the server, for server.cpp only, which compiles Boost.Beast. Beast uses Boost.Asio,
-// and the boards' loop uses standalone Asio. No source can include both, so the server and the loop
-// exchange closures.
+// For server.cpp only, which compiles Boost.Beast. Beast uses Boost.Asio, and the boards' loop uses
+// standalone Asio. No source can include both, so the server and the loop exchange closures.
 #pragma once
 
 #include <array>
