@@ -83,7 +83,6 @@ void Board::wait_active(Duration timeout) {
 
 void Board::send(const Command& command, Duration timeout) {
   const auto impl = impl_;
-  // A stop is sent even without a timeout.
   if (command.kind == CommandKind::stop && timeout.count() <= 0) impl->post(command);
   impl->execute(command, timeout);
 }

@@ -157,8 +157,7 @@ void Board::Impl::take_name() {
   for (const PathStatus& path : paths) path_names.push_back(path.name);
 }
 
-// Holds the heartbeats back if a callback hangs, because the program then leaves the robot
-// unattended. The timer expires when a callback may reach the limit.
+// The timer expires when a callback may reach the limit.
 void Board::Impl::look_at_callbacks() {
   const auto busy = callbacks.busy_for();
   const bool hangs = busy && *busy >= callback_limit;

@@ -37,7 +37,6 @@ class CallbackThread {
  public:
   using Clock = std::chrono::steady_clock;
   struct Restart {};
-  // Bytes of a UART wait for its callbacks.
   struct UartNews {
     int channel;
   };
@@ -59,7 +58,6 @@ class CallbackThread {
   void stop();
 
   void notify(Notice notice);
-  // Empty if no callback runs.
   std::optional<Clock::duration> busy_for() const;
 
   // Adds a callback. It is called with the newest notice, if any, and with each new notice.

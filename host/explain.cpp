@@ -80,7 +80,6 @@ CauseWords words_of(LinkCause cause) {
 constexpr const char* clear_on_purpose =
     "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), ";
 
-// Why outputs are off, and the action before arm().
 Words disarm_words(DisarmCause cause) {
   switch (cause) {
     case DisarmCause::not_yet:
@@ -202,7 +201,6 @@ Words refusal_words(const Command* command, Refusal code, const LinkStatus& link
                       : "send it again if it is still wanted";
       break;
     case Refusal::auth:
-      // A board accepts such a setting over its own cable only.
       words.fix = is(CommandKind::setting, command) && is_site_setting(command->text)
                       ? "send it over USB: serial:auto"
                       : words_of(LinkCause::key_needed).fix;

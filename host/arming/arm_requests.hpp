@@ -43,7 +43,6 @@ class ArmRequests {
   bool any() const { return !requests_.empty(); }
   // The ticket of the oldest call; without a call, greater than any ticket.
   Ticket first() const { return requests_.empty() ? no_ticket : requests_.front().ticket; }
-  // End all calls, the call with `ticket` (false: no such call), or the calls past their deadlines.
   void end(Outcome outcome, Refusal code, Time now);
   bool cancel(Ticket ticket, Time now);
   void expire(Time now);

@@ -39,7 +39,6 @@ const char* to_text(DisarmCause cause) {
 
 namespace {
 
-// None for `none` and `link`.
 DisarmCause cause_of(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:
@@ -59,7 +58,6 @@ DisarmCause cause_of(SafeReason reason) {
   return DisarmCause::none;
 }
 
-// For a reason that may be older than the session.
 DisarmCause earlier_cause_of(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:
@@ -73,8 +71,7 @@ DisarmCause earlier_cause_of(SafeReason reason) {
 
 }  // namespace
 
-// The first cause is kept until the next arm(), because later causes follow from it. A fault since
-// the board's start, such as an unconfirmed wiring, waits for a person.
+// The first cause is kept until the next arm(), because later causes follow from it.
 void ArmingMachine::disarm(DisarmCause cause) {
   if (cause == DisarmCause::restart) {
     earlier_ = static_cast<std::uint8_t>(earlier_ | bit(SafeReason::fault));

@@ -15,11 +15,10 @@
 //
 // A lost link does not disarm. In every state, relay 1, the motor supply
 // (docs/reference/safety.md), shows whether the board restored its outputs (`recovery`). arm()
-// clears the first cause that it finds, and each cause that the first cause hid, once. A stop, a
-// released handle or an obstacle meanwhile is not cleared, and ends the arm(). A stop, a watchdog
-// or a fault is not cleared if it may be older than the session, because a restarted program would
-// drive off. It is new only after the board was without it. A fault since the board's start is not
-// cleared.
+// clears the first cause that it finds, and each cause that the first cause hid, once. A new stop,
+// released handle or obstacle is not cleared, and ends the arm(). A stop, a watchdog or a fault is
+// not cleared if it may be older than the session, because a restarted program would drive off. It
+// is new only after the board was without it. A fault since the board's start is not cleared.
 #pragma once
 
 #include <cstdint>

@@ -106,7 +106,6 @@ void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
   });
 }
 
-// Sends one setting after the other. The user's handler receives the last result.
 class AsyncBoard::TimingSteps final : public Impl::Sequence {
  public:
   TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
@@ -134,7 +133,6 @@ class AsyncBoard::TimingSteps final : public Impl::Sequence {
   const Time deadline_;
 };
 
-// Sends a transfer, then waits for the answer with the packet number of the transfer.
 class AsyncBoard::TransferSteps final : public Impl::Sequence {
  public:
   TransferSteps(Impl& impl, Time timeout, CompletionPtr completion)
@@ -183,7 +181,6 @@ void AsyncBoard::start_transfer(const Command& command, Duration timeout,
   (new TransferSteps(*impl_, Impl::time_of(timeout), std::move(completion)))->begin(command);
 }
 
-// After the farewell, closes the board or watches it, and passes the result on.
 class AsyncBoard::Farewell final : public Impl::Sequence {
  public:
   using Then = void (*)(Impl& impl);
@@ -312,7 +309,6 @@ void AsyncBoard::Impl::describe(const Device& device) {
   describe_in_recording(device);
 }
 
-// The recording begins with the known names and events.
 void AsyncBoard::record(Recording& recording) {
   Impl& impl = *impl_;
   for (const auto& path : impl.paths) {

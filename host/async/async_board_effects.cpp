@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An AsyncBoard performs the effects of its session: it sends, then reports.
 #include <utility>
 #include <variant>
 

@@ -55,7 +55,6 @@ void AsyncBoard::Impl::end_entry(Time late) {
   settle();
 }
 
-// Datagrams from before the sleep are dropped: they may wait in sockets and buffers.
 void AsyncBoard::Impl::on_sleep() {
   backlog.on_sleep();
   session.on_sleep(now);
@@ -154,7 +153,6 @@ void AsyncBoard::Impl::open() {
   if (problem) open_again();
 }
 
-// `problem`: the first error.
 void AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& problem) {
   path.opened = false;
   try {
@@ -193,7 +191,6 @@ Ticket AsyncBoard::Impl::leave(Time timeout) {
 
 void AsyncBoard::Impl::close() {
   if (phase == Phase::closed) return;
-  // Sent once, without waiting for an answer.
   if (is_open()) enter(Completion::How::post, [this] { leave(Time{0}); });
   phase = Phase::closed;
   paths.close();

@@ -28,8 +28,7 @@
 
 namespace r4 {
 
-// Outlives an AsyncBoard that a callback destroys. Larger than 15 members and 40 functions, because
-// it implements every function of AsyncBoard.
+// Outlives an AsyncBoard that a callback destroys. Large, because it implements all of AsyncBoard.
 struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<AsyncBoard::Impl> {
   using Waits = r4::Waits<CompletionPtr>;
   class Sequence;
@@ -83,7 +82,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
       if (is_open()) guarded([&] { one(arguments...); });
     });
   }
-  // Also during open().
   void report(const CarrierEvent& event) {
     callbacks.event.each([&](auto& one) {
       if (is_open() || phase == Phase::made) guarded([&] { one(event); });

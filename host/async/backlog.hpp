@@ -21,7 +21,6 @@ class Backlog {
     waking_ = 2;
     forget();
   }
-  // Drops the kept state, which is from an earlier boot of the board or from before a sleep.
   void forget() { size_ = 0; }
 
   bool drops() const { return waking_ != 0; }
@@ -36,8 +35,7 @@ class Backlog {
     waking_ = 0;
     rings_ = 0;
   }
-  // The timer expired. True if the kept state must be reported: after two expiries without
-  // on_drained(), because some transports never call on_drained().
+  // True if the kept state must be reported, because some transports never call on_drained().
   bool on_timer() {
     if (waking_ != 0) --waking_;
     rings_ = size_ == 0 ? 0 : rings_ + 1;

@@ -43,7 +43,6 @@ class Waits {
   // An id that is not a ticket of a session.
   Ticket next_id() { return next_id_++; }
 
-  // Ignored if no handler waits for the command.
   void end(Ticket ticket, const CommandResult& result) {
     const auto found = std::find_if(commands_.begin(), commands_.end(),
                                     [&](const Command& each) { return each.ticket == ticket; });
@@ -63,8 +62,7 @@ class Waits {
     });
     return conditions_.size() != before;
   }
-  // Ends the condition with this id as cancelled. Returns the ticket of the command with this id,
-  // which the session must cancel; 0 if there is none.
+  // Ends the condition. Returns the ticket of the command that the session must cancel; 0: none.
   Ticket cancel(Ticket id, Time now) {
     end_conditions(
         [id](const Condition& each) {

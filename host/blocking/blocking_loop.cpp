@@ -12,8 +12,7 @@ namespace r4 {
 
 namespace {
 
-// The session ends every command at the deadline of the call. If a begun call lasts this much
-// longer than its deadline, the loop hangs.
+// The session ends a command at its deadline. If a call lasts this much longer, the loop hangs.
 constexpr BlockingLoop::Duration grace{500};
 
 constexpr BlockingLoop::Duration patience{1000};

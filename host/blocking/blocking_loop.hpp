@@ -142,8 +142,7 @@ class BlockingLoop {
   // Runs `shut` on the loop unless it is closed, and joins the thread. Idempotent.
   void close(std::function<void()> shut);
 
-  // The first step of `shut`: the loop then accepts nothing. Returns false if the loop was already
-  // closed; otherwise calls `last` under the lock.
+  // The first step of `shut`. False if already closed; otherwise calls `last` under the lock.
   template <class Last>
   bool mark_closed(Last last) {
     {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Bridge runs its pairs on one loop, in one thread.
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
 #include <asio/use_future.hpp>
@@ -122,7 +121,6 @@ struct Bridge::Impl {
     return all;
   }
 
-  // Runs `action` on the loop and waits for its end, at most one turn of the loop.
   template <class Action>
   std::invoke_result_t<Action> on_loop(Action action) {
     return asio::post(io, asio::use_future(std::move(action))).get();

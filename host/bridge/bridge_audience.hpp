@@ -46,8 +46,7 @@ class BridgeAudience {
       if (now < place.watches_until) call(place.peer);
     }
   }
-  // Calls `call(peer)` for each listener. Each round begins with another listener, so that a small
-  // budget reaches every listener in turn.
+  // Each round begins with another listener, so that a small budget reaches all in turn.
   template <class Call>
   void for_each_listener(Time now, Call call) {
     ++turn_;

@@ -55,8 +55,7 @@ class BridgeHosts {
   bool is_served_at(Peer peer) const;
   // True if a heartbeat of this host passed at most a timeout ago.
   bool knows(Peer from, SessionId sid, Time now) const;
-  // True if this host is served, or was served before a silence. Its datagrams pass at once, over
-  // every path.
+  // True if this host is served, or was before a silence. Its datagrams pass at once on every path.
   bool trusts(Peer from, SessionId sid, Time now) const;
   bool serves(SessionId sid, Time now) const;
   // The number of this host's first heartbeat that passed since the last silence.

@@ -30,7 +30,6 @@ bool is_single(const Datagram& datagram, Text name) {
   return datagram.command_count() == 1 && datagram.command().name() == name;
 }
 
-// True if a command is a setting that a board accepts only from its own cable.
 bool has_site_setting(const Datagram& datagram) {
   for (const Field& field : datagram) {
     if (field.name() != "C") continue;
@@ -213,8 +212,7 @@ void BridgedPair::follow_hosts(Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   const Text farewell = watch_.write_end(writer);
-  // The board sends states to the served host without a lease. On a shared transport other programs
-  // may watch, so the bridge lets the lease run out.
+  // A served host gets states without a lease. Other programs of a shared transport may need one.
   if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 
@@ -231,7 +229,6 @@ bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer fr
   return false;
 }
 
-// The board sees the bridge as one watcher, so the bridge keeps the lease of each watcher.
 void BridgedPair::on_lease(const Datagram& datagram, Peer from, Time now) {
   Command command;
   FieldSet fields;
@@ -287,8 +284,7 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
   }
 }
 
-// Delivers to served hosts and watchers. A heartbeat also goes to listeners and, while no host is
-// served, to every peer that the carrier reaches with one datagram.
+// While no host is served, a heartbeat also goes to all peers that one datagram reaches.
 void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time now) {
   const Priority priority = is_state ? Priority::state : Priority::normal;
   const std::vector<Peer>& served = known_.served();
@@ -309,7 +305,6 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   });
 }
 
-// Delivers to each path of the named session if the session is served, else to the peer that asked.
 void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) {
   const SessionId sid = answer.session_id();
   std::optional<Peer> asker;

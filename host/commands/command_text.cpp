@@ -53,7 +53,6 @@ std::string byte_words(int count, Text at = Text()) {
                      at.size() <= 1 ? "" : " at " + words(at));
 }
 
-// "rate 50"
 std::string setting_words(const Command& command) {
   std::string text = shown(command);
   text.erase(0, std::min(text.size(), std::string_view("C:").size()));  // empty if not writable

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's datagrams that end commands under way.
 #include "commands_under_way.hpp"
 #include "r4link/tables/commands.hpp"
 #include "r4link/tables/state_fields.hpp"
@@ -9,8 +8,7 @@ namespace r4 {
 
 namespace {
 
-// For boards without CMD: true if the datagram of `state` shows the value of `command`. Never true
-// for commands without a state field (threshold, fields, settings).
+// For boards without CMD. Never true without a state field (threshold, fields, settings).
 bool state_shows(const State& state, const Command& command) {
   if (command.kind == CommandKind::relay) {
     return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;
@@ -69,7 +67,6 @@ void CommandsUnderWay::on_heartbeat(const SafeReport& report, std::optional<std:
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
     if (pending.kind != CommandKind::clear || !name_cause(pending)) continue;
-    // The cause is newer than the program's call.
     if (cause_ != 0 && cause_ != pending.cause) {
       finish(pending, Outcome::cancelled, Refusal::none, now);
     }
@@ -90,7 +87,6 @@ bool CommandsUnderWay::is_after_farewell(std::uint32_t t_ms) const {
 
 void CommandsUnderWay::on_identity(const Identity& identity, Time now) {
   for (Pending& pending : pending_.under_way()) {
-    // An answer to an earlier question does not count.
     if (identity.has_asked && identity.asked != pending.pnum) continue;
     BoardWiring wiring;
     const bool answered =

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The start, the sending, and the end of commands by time or by the program.
 #include "commands_under_way.hpp"
 
 #include <algorithm>

@@ -60,7 +60,6 @@ class CommandsUnderWay {
   Ticket send(const Setpoints& group, Time timeout, Time now);
   Ticket leave(Time timeout, Time now);
   Ticket take_ticket() { return next_ticket_++; }
-  // Gives up a command, which the board may execute. A stop continues.
   void cancel(Ticket ticket, Time now);
   // End every command except stops. give_up() does not end questions either.
   void end_all_but_stops(Outcome outcome, Time now);
@@ -80,17 +79,12 @@ class CommandsUnderWay {
   // True if arm() has to wait for a step, a stop, or an earlier E:CLEAR.
   bool delays_arming();
 
-  // --- actions that are due
-
   void expire(Time now);
   void send_queued(Time now);
   // Ends held back output commands that do not wait for an arm().
   void refuse_held_back(Time now);
-  // Repeats unconfirmed commands and the last confirmed stop.
   void repeat(Time now);
   Time next();
-
-  // --- datagrams of the board
 
   void on_state(Time now);
   void on_heartbeat(const SafeReport& report, std::optional<std::uint32_t> t_ms, Time now);
@@ -100,8 +94,6 @@ class CommandsUnderWay {
   void on_refusal(const Nack& nack, bool proof, bool others, Time now);
   // True if the command with this number is a setting that the board accepts only over a cable.
   bool is_cable_only(std::uint32_t pnum);
-
-  // --- for commands that are sent once
 
   // True if a group or a part of a group waits: later commands must not overtake it.
   bool is_group_ahead();

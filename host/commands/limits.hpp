@@ -14,7 +14,6 @@ struct Command;
 class Setpoints;
 struct SessionOptions;
 
-// Called by the constructors of the boards and of Session.
 void require_valid(const SessionOptions& options);
 
 // A watcher may send only a stop and Q:ID. For other commands these functions throw Error.

@@ -20,7 +20,6 @@ struct LinkTimingStep {
   std::uint32_t ms;
 };
 
-// First an interval below every timeout, then the timeout, then the interval, if it differs.
 inline std::vector<LinkTimingStep> link_timing_steps(std::chrono::milliseconds timeout,
                                                      std::chrono::milliseconds heartbeat) {
   const auto timeout_ms = static_cast<std::uint32_t>(timeout.count());

@@ -25,8 +25,7 @@ namespace r4 {
 // passed it and it was executed. A confirmed stop is repeated for stop_linger:
 //     sent --the board reports it--> lingering --the time is over, another stop, an E:CLEAR--> free
 //
-// A group in one datagram is one command. Otherwise the commands of the group pass through these
-// states in turn: each command is queued when its predecessor is confirmed.
+// A group that is sent one by one passes through these states once for each command.
 struct PendingCommand {
   enum class Stage : std::uint8_t {
     free,

@@ -23,7 +23,6 @@ class Posts {
   PostResult send(const Command& command, Time now);
   PostResult send(const Setpoints& group, Time now);
   void on_sent(const Sending& sending, SendResult result) { delivery_.on_sent(sending, result); }
-  // Call it after the effects of the last post.
   PostResult result();
   bool is_clear() const { return kind_ == CommandKind::clear; }
   // `nack` proves that the board did not execute the command.
@@ -39,7 +38,6 @@ class Posts {
   };
 
   PostResult begin(Outbox::Sent sent, const Command& command, bool is_group);
-  // Removes the post with this number; null if there is none.
   const Posted* take(std::uint32_t pnum);
 
   Effects& effects_;

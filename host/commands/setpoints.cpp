@@ -11,7 +11,6 @@ namespace r4 {
 
 namespace {
 
-// Why the command cannot join a group with `others` commands.
 Problem bad_group_member(const Command& command, std::size_t others) {
   Problem problem{ErrorKind::usage, shown(command), "", ""};
   if (!joins_groups(command.kind)) {

@@ -14,7 +14,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// The chip at the address; signals::count if there is none.
 int chip_at(const Wiring& wiring, std::uint8_t address) {
   for (int i = signals::osmc_chip; i <= signals::dac_chip; ++i) {
     if (wiring.places[i].connected() && wiring.places[i].number() == address) return i;

@@ -10,20 +10,17 @@ namespace r4::commissioning {
 using CheckFunction = void(Checking&, int channel);
 CheckFunction* function_of(const Check& check);
 
-// --- the board itself: check_board.cpp
 void check_identity(Checking& c, int);
 void check_settings(Checking& c, int);
 void check_chips(Checking& c, int);
 void check_user_bus(Checking& c, int);
 void check_uart(Checking& c, int channel);
 
-// --- inputs: check_inputs.cpp
 void check_supply(Checking& c, int input);
 void check_handle(Checking& c, int);
 void check_encoder(Checking& c, int channel);
 void check_ultrasonic(Checking& c, int channel);
 
-// --- outputs: check_outputs.cpp
 void check_motor_supply(Checking& c, int);
 void check_relay(Checking& c, int channel);
 void check_servo(Checking& c, int channel);
@@ -32,7 +29,6 @@ void check_dhb12(Checking& c, int channel);
 void check_bldc(Checking& c, int channel);
 void check_stepper(Checking& c, int channel);
 
-// --- the link: check_link.cpp
 void check_transports(Checking& c, int);
 void check_silence(Checking& c, int);
 void check_stop(Checking& c, int);

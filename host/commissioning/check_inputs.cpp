@@ -68,7 +68,6 @@ Range range_of(const States& states, Read read) {
   return range;
 }
 
-// The states since forget_states(), and of 100 ms more.
 States states_until_now(Checking& c) {
   States states = c.states_since_forget();
   const States more = c.collect(100ms);
@@ -76,8 +75,7 @@ States states_until_now(Checking& c) {
   return states;
 }
 
-// Time by the board's clock from the first state with a released handle to the first state that
-// reports safe. Below 0: unknown.
+// By the board's clock, from the first released handle to the first safe state; below 0: unknown.
 double ms_to_safe(const States& states) {
   const auto first = [&](auto is) { return std::find_if(states.begin(), states.end(), is); };
   const auto released = first([](const State& state) { return state.handle == Handle::released; });

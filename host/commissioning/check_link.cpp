@@ -48,8 +48,7 @@ void check_transports(Checking& c, int) {
   }
 }
 
-// When the board goes safe because of the link, it ends its states. The time of the last state is
-// measured.
+// On a lost link the board goes safe and ends its states: the last state gives the time.
 void check_silence(Checking& c, int) {
   constexpr Duration longest = 1500ms;  // the default timeout plus a margin
   constexpr std::int32_t expected_ms = 1030;

@@ -16,7 +16,6 @@ constexpr Duration half_a_second = 500ms;
 
 using MakeCommand = Command (*)(Channel, Pwm, Direction);
 
-// The encoders that count while a motor turns.
 struct EncoderTravel {
   std::optional<ReceivedState> first;
   ReceivedState last;

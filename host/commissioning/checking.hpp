@@ -31,8 +31,6 @@ class Checking {
            CheckResult& result)
       : board(tested), report(so_far), check(its_check), person_(person), result_(result) {}
 
-  // --- the person
-
   void say(std::string_view text) { person_.say(check.id, text); }
   bool confirms(Topic topic, std::string text);
   // Gives up unless the person confirms. `otherwise`: the note.
@@ -40,8 +38,6 @@ class Checking {
   double number(Topic topic, std::string text, std::string unit);
   // The thing that moved or clicked; no value if nothing did. Gives up if nothing is connected.
   std::optional<Thing> which(Thing commanded, std::string text);
-
-  // --- the board
 
   void send(const Command& command);
   // Commands the moving output. The key is not checked meanwhile, so this takes at most 200 ms.
@@ -64,8 +60,6 @@ class Checking {
   // board went safe. Throws Error if no state comes.
   bool watch(ReceivedState& state);
 
-  // --- the result
-
   void measured(std::string what, double value, std::string unit);
   void found(Finding finding, std::string detail = {});
   void found_at(std::string thing, Finding finding, std::string detail = {});
@@ -87,7 +81,6 @@ class Checking {
   CheckResult& result_;
 };
 
-// True if the report has a finding of the check.
 bool has_found(const Report& report, std::string_view check);
 
 }  // namespace r4::commissioning

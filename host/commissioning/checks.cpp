@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The table of checks, in the order of the paper's sections 7.3 to 8.5. A check is a row here and a
-// function (check_functions.hpp).
+// The table of checks, in the order of the paper's sections 7.3 to 8.5.
 
 #include <algorithm>
 #include <string>

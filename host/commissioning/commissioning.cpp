@@ -35,7 +35,6 @@ void take_wiring(const BoardWiring& kept, Report& report) {
   }
 }
 
-// Requests the board's identity and wiring. A text stays empty if the board does not report it.
 void identify(BoardUnderTest& board, Report& report) {
   board.wait_heard();
   try {
@@ -120,7 +119,6 @@ void give_full_scale(Checking& c, const Learnt& learnt) {
   c.measured(std::string(name.data(), name.size()) + ", full scale", present * learnt.factor, "V");
 }
 
-// Discards the learnt full scales, or everything else that was learnt.
 void forget_learnt(Report& report, bool full_scales) {
   for (CheckResult& check : report.checks) {
     std::erase_if(check.learnt, [&](const Learnt& each) {
@@ -129,8 +127,7 @@ void forget_learnt(Report& report, bool full_scales) {
   }
 }
 
-// The number of outputs that agree with the unconfirmed plan. 0 if a check disagrees or was not
-// done.
+// The outputs that agree with the unconfirmed plan; 0 if a check disagrees or was not done.
 int outputs_as_planned(const Report& report) {
   if (report.wiring_source != to_text(WiringSource::plan) || !report.found().empty()) return 0;
   int outputs = 0;
@@ -219,8 +216,7 @@ CheckResult& Commissioning::result_of(const Check& check) {
 
 Commissioning::End Commissioning::run(std::string_view id) { return run(check_named(id)); }
 
-// Runs `work`, and sets the status of the result. Returns the person's choice to skip, repeat or
-// leave, if any.
+// Sets the status of the result. Returns the person's choice to skip, repeat or leave, if any.
 std::optional<Answer::Kind> Commissioning::carry_out(CheckResult& result,
                                                      const std::function<void()>& work) {
   try {

@@ -9,7 +9,6 @@
 namespace r4::commissioning {
 namespace {
 
-// Returns "osmc" for "osmc 1 pwm".
 std::string group_of(SignalKind kind) {
   const std::string name = signal_name(row_of(kind).first);
   return name.substr(0, name.find(' '));

@@ -21,7 +21,6 @@ struct Thing {
 std::string name_of(Thing thing);
 // The thing of a signal. `signal`: an index in Wiring.
 Thing thing_of(int signal);
-// The number of signals of a thing.
 int parts_of(SignalKind first);
 // The things that can be exchanged with each other: of one kind, or motors on H-bridges.
 std::vector<Thing> alike(SignalKind first);

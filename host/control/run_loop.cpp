@@ -33,7 +33,6 @@ class StepWatchdog {
   bool on_;
 };
 
-// Why this loop may not send output commands; none if it may.
 DisarmCause cause_of(const Board& board, const LoopOptions& options) {
   return options.arming == Arming::off ? DisarmCause::none : board.disarmed_by();
 }

@@ -12,8 +12,7 @@
 
 namespace r4 {
 
-// Sends the steps of a device, then its fields. The handler gets the last result, or the first
-// failure:
+// Sends a device's steps, then its fields. The handler gets the last result or the first failure:
 //     command --confirmed--> answer --as described--> pause --over--> next command
 //        |                                                                ^
 //        +---- confirmed, without an answer (X:POLL, F) ------------------+

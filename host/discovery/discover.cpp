@@ -23,7 +23,6 @@ void append(std::vector<Each>& to, std::vector<Each> more) {
   std::move(more.begin(), more.end(), std::back_inserter(to));
 }
 
-// Returns "udp" for "udp:?id=left-arm".
 std::string_view scheme_of(const FoundBoard& board) {
   return std::string_view(board.url).substr(0, board.url.find(':'));
 }

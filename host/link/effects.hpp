@@ -50,7 +50,6 @@ struct CommandEnded {
 };
 // The board has restarted and kept only its stored settings. Reported before the new state.
 struct BoardRestarted {};
-// `cause`: none if armed.
 struct ArmingChanged {
   DisarmCause cause = DisarmCause::none;
 };

@@ -37,7 +37,6 @@ class GroupSupport {
     unanswered_ = 0;
   }
   // True if Q:ID is due. Call it while a group waits. `answers`: the board has ever sent an answer.
-  // Boards of the paper's release never answer.
   bool ask(bool answers, Time now) {
     if (state_ != State::unknown || now < next_) return false;
     next_ = now + retry;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board according to its datagrams: the newest state, the clock, and the firmware's
-// capabilities. A restart of the board clears all of them.
+// The board's newest state, clock and capabilities. A restart of the board clears all of them.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's key, and whether the board accepts it.
-//
 // With a key, every datagram is signed as soon as the board's nonce is known. A board without a
 // nonce has no key and obeys any host, so a host with a key refuses it. A board that rejects this
 // host's key, or its lack of a key, takes no heartbeats or answers AUTH.
@@ -29,8 +28,7 @@ class HostKey {
     in_vain_ = 0;
     host_seen_ = now;
   }
-  // `reason`: of the newest heartbeat. `none`: the board has a host. `link`: the board has no host.
-  // Other reasons do not show whether the board has a host.
+  // `reason`: of the newest heartbeat. `none`: the board has a host. `link`: it has no host.
   void on_reason(SafeReason reason, Time now) {
     if (reason == SafeReason::none) on_host_seen(now);
     if (reason == SafeReason::link) host_seen_.reset();

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Keeps the link of a session alive: sends heartbeats or a watcher's leases, requests the state
 // fields that the session needs, and decides whether commands may be sent.
-//
-// The machines that it joins have their own diagrams: protocol/link/host_link.hpp, host_role.hpp,
-// field_selection.hpp, host_key.hpp, and a watcher's leases (../paths/lease.hpp).
 #pragma once
 
 #include <cstddef>
@@ -30,20 +27,13 @@ class LinkKeeper {
   LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& key, Paths& paths,
              Outbox& outbox, Statistics& counts);
 
-  // --- events
-
   void on_transport(std::size_t path, bool up, bool can_ask, Time now);
   void on_transport_trouble(TransportTrouble trouble) { trouble_ = trouble; }
-  // `result`: whether the path has taken the datagram.
   void on_sent(const Sending& sending, SendResult result, Time now);
-  // The board answered BUSY at its time `t_ms`. Without `t_ms`, a transport on CAN has received
-  // frames of another host with the same ids.
+  // As Paths::on_busy().
   void on_busy(std::size_t path, std::optional<std::uint32_t> t_ms, Time now);
-  // A state with the board's time `t_ms` names a command of this session.
   void on_own_command(std::uint32_t t_ms, Time now);
   FieldSelection& fields() { return fields_; }
-
-  // --- actions that are due
 
   // Sends Q:ID on paths whose board is unknown. The session begins when the boards are known.
   void ask_paths(Time now);
@@ -55,10 +45,7 @@ class LinkKeeper {
   // Ends the link: the keeper then sends nothing.
   void leave(Time now);
   void begin_anew();
-  // True: holds back heartbeats and commands. False: resumes them.
   void hold(bool held);
-
-  // --- the state of the link
 
   // Call it before the functions below: applies changes of the link to the role.
   void update() { role_.on_link(is_up()); }
@@ -73,8 +60,7 @@ class LinkKeeper {
   bool is_leaving() const { return leaving_; }
   LinkStatus status(ChipFault fault, Time now) const;
 
-  // Adds the needed fields to an F, and remembers the choice. Other commands are unchanged. The
-  // text is valid until the next call.
+  // Adds the needed fields to an F, and remembers it. The text is valid until the next call.
   Command with_needed_fields(const Command& command);
 
  private:

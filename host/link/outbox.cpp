@@ -48,8 +48,7 @@ PathSet Outbox::send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnu
   return over;
 }
 
-// Signs for each path separately (docs/reference/protocol.md, "Paths"). A watcher's datagrams need
-// no signature. False if the datagram would be too long.
+// Signs for each path (docs/reference/protocol.md, "Paths"). False if the datagram is too long.
 bool Outbox::send_over(std::size_t path, DatagramWriter& writer, CommandKind kind,
                        std::uint32_t pnum, Priority priority, Time now) {
   const std::size_t size = writer.size();

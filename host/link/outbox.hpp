@@ -50,7 +50,6 @@ class Outbox {
   BoardRole role() const { return role_; }
   void change_role(BoardRole role) { role_ = role; }
   bool watches() const { return role_ == BoardRole::watch; }
-  // The SID of this session's datagrams; no_session for a watcher.
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
 
  private:

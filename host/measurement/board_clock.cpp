@@ -7,8 +7,7 @@
 
 namespace r4 {
 
-// Microseconds of the board's clock since the first datagram. t_ms may be older than the newest T,
-// because datagrams overtake each other.
+// Microseconds since the first datagram. Datagrams overtake: t_ms may be older than the newest T.
 double BoardClock::since_first(std::uint32_t t_ms) const {
   const auto later = static_cast<std::int32_t>(t_ms - newest_t_ms_);
   return static_cast<double>(newest_board_ms_ + later) * 1000;
@@ -26,8 +25,7 @@ void BoardClock::limit(Side& side, std::uint32_t t_ms, Time host, Time margin) {
     newest_t_ms_ = t_ms;
   }
   if (place(side, t_ms, host, margin)) return;
-  // No drift up to 100 ppm satisfies all limits: a clock was set, or paused while the computer
-  // slept. Only the newest limit is kept.
+  // No drift up to 100 ppm fits: a clock was set or paused (sleep). Only the newest limit is kept.
   restart();
   limit(side, t_ms, host, margin);
 }
@@ -49,7 +47,6 @@ bool BoardClock::place(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   return true;
 }
 
-// Narrows the drift by the ended second, and forgets the oldest second.
 void BoardClock::next_second(std::int64_t second) {
   narrow_drift(std::exchange(newest_second_, second));
   const double at = static_cast<double>(second) * 1e6;
@@ -58,8 +55,7 @@ void BoardClock::next_second(std::int64_t second) {
   }
 }
 
-// The offset stays below the upper limit and above the lower limit, so the line through both limits
-// bounds its slope.
+// The offset stays between the limits, so the line through both limits bounds its slope.
 void BoardClock::Slopes::narrow(const Limit& upper, const Limit& lower) {
   if (lower.at == upper.at) return;
   const double slope = (-lower.offset - upper.offset) / (lower.at - upper.at);

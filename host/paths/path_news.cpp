@@ -28,7 +28,6 @@ void PathNews::restart(std::size_t index) {
   if (tracker.started()) tracker.restart();
 }
 
-// If T is newer, or equal with a newer number on the same path, sets `newest` and returns true.
 bool PathNews::is_new(std::optional<First>& newest, std::size_t path, std::uint32_t t_ms) const {
   const std::uint32_t pnum = paths_[path].pnum;
   const bool fresh = !newest || newer(t_ms, newest->t_ms) ||
@@ -106,7 +105,6 @@ void PathNews::count_gap(Numbers& path) {
   counters_.lost += path.gap - path.others;
 }
 
-// If a late packet was counted as lost, corrects the count and returns true.
 bool PathNews::take_back(Numbers& path) {
   if (path.arrival != Arrival::late || path.lost == 0) return false;
   --path.lost;

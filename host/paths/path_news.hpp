@@ -34,8 +34,7 @@ class PathNews {
   bool take_heartbeat(std::size_t path, std::uint32_t t_ms);
   // False if a newer state is known.
   bool is_newest_state(std::size_t path, std::uint32_t t_ms);
-  // False for a duplicate. If several states with one T share the fields, a state is new if it has
-  // a field that the earlier states lack.
+  // False for a duplicate: with an equal T, a state is new only if it adds a field.
   bool take_state(std::size_t path, std::uint32_t t_ms, FieldSet present);
   // True if no newer datagram is known: this datagram becomes the newest.
   bool is_newest(std::size_t path, std::uint32_t t_ms);

@@ -110,7 +110,6 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   path.questions.answered = true;
   path.questions.unanswered = 0;
   path.questions.round_trip = now - *asked;
-  // An answer is of a later boot if its question was sent after the answer of the known boot.
   const bool later = *asked > proven_;
   // The answer was sent between the question and now, which bounds T.
   const bool same = clock_.known() ? clock_.fits(t_ms, *asked, now, PathClock::restart_tolerance_ms)
@@ -153,7 +152,6 @@ bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
   return path.clock.known() && path.clock.fits(t_ms, now, now, late_of(path));
 }
 
-// False if another path of this boot contradicts T.
 bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
   return std::all_of(paths_.begin(), paths_.end(), [&](const Path& each) {
     const bool knows = &each != &path && each.known && each.clock.known() && each.boot == boot_;
@@ -161,7 +159,6 @@ bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
   });
 }
 
-// True if T fits the session's clock or, before the session begins, the clocks of the other paths.
 bool Paths::fits(const Path& path, std::uint32_t t_ms, Time now) const {
   if (!begun_) return fits_others(path, t_ms, now);
   return !clock_.known() || clock_.fits(t_ms, now, now, late_of(path));

@@ -50,8 +50,6 @@ class Paths {
 
   std::size_t count() const { return paths_.size(); }
 
-  // --- the transports
-
   // `can_ask`: false for a watcher on a bus, which must not send Q:ID. Then the only path is
   // trusted. With other paths, T must fit the board's clock, which starts at random.
   void on_transport(std::size_t index, bool up, bool can_ask, Time now);
@@ -60,8 +58,6 @@ class Paths {
   }
   // After a sleep or days of silence, the board's clock is unknown on every path. The ids are kept.
   void on_sleep(Time now);
-
-  // --- sending
 
   // The paths for heartbeats, leases and commands: none before the session has begun.
   PathSet speaking() const { return begun_ ? known() : PathSet{0}; }
@@ -94,8 +90,6 @@ class Paths {
   // True if no datagram with a newer T was admitted: this T then sets the board's clock.
   bool is_newest(std::size_t index, std::uint32_t t_ms, Time now);
 
-  // --- BUSY: another host is in control
-
   // The board answered BUSY at its time `t_ms`. Without `t_ms`, a transport on CAN has received
   // frames of another host with the same ids.
   void on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now);
@@ -107,8 +101,6 @@ class Paths {
 
   Leases& leases() { return leases_; }
   const Leases& leases() const { return leases_; }
-
-  // --- reports
 
   PathSet carrying(Time now) const {
     return those([now](const Path& path) { return is_heard(path, now); });

@@ -21,8 +21,7 @@ constexpr std::chrono::milliseconds interval{250};
 // Smallest recorded change of the wall clock. Smaller changes add up.
 constexpr Time clock_step{std::chrono::milliseconds{100}};
 
-// Blocks all signals, because signals are for the program's threads. SIGXFSZ (file size limit)
-// would end the program.
+// Signals are for the program's threads. SIGXFSZ (file size limit) would end the program.
 class NoSignals {
  public:
   NoSignals() {

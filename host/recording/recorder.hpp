@@ -2,9 +2,8 @@
 // Implements Recording. Boards add records from any thread without waiting for the disk.
 //     record() -- at most 4 MiB --> the writer's thread --> RecordingWriter --> the disk
 //
-// The threads share a lock while a datagram is copied. A record's time is the wall clock's time at
-// the start plus the steady clock's time since the start. If the wall clock is set, an event
-// reports the change.
+// The threads share a lock while a datagram is copied. A record's time is the wall clock at the
+// start plus the steady clock's time since then. If the wall clock is set, an event reports it.
 #pragma once
 
 #include <atomic>
@@ -51,8 +50,7 @@ class Recorder {
   // True if the recording has ended. Takes no lock, because it is called for every datagram.
   bool ended() const { return ended_.load(std::memory_order_acquire); }
   std::optional<Problem> problem() const;
-  // Reports that the file was restarted, or that the recording has ended by itself. `known`: the
-  // news count that the caller has seen. This call updates `known`.
+  // Why the file was restarted or the recording ended. Updates `known`, the caller's news count.
   std::optional<Problem> news(unsigned& known) const;
   unsigned news_count() const { return news_count_.load(std::memory_order_acquire); }
   std::uint64_t records() const { return records_; }

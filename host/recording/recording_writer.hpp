@@ -37,8 +37,7 @@ class RecordingWriter {
   void close();  // as flush(), and ends the compressed frame
 
   const std::string& path() const { return path_; }
-  // Why the file was restarted since the last call; no value if it was not restarted. Kind `data`:
-  // the content is lost.
+  // Why the file was restarted since the last call, if it was. Kind `data`: the content is lost.
   std::optional<Problem> take_trouble() { return std::exchange(trouble_, std::nullopt); }
 
  private:

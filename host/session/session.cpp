@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The calls of the program, and time.
 #include "session.hpp"
 
 #include <algorithm>

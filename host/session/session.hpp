@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's side of one board, without I/O: datagrams and time in, effects out
 // (../link/effects.hpp). Each datagram is written once and signed for each path (outbox.hpp).
-//
 //   datagram --> Paths --> HostLink, HeardBoard --> LinkKeeper --> ArmRequests --> CommandsUnderWay
 //                admits    the board's state        control        arming          ends of
 //                                                                                  commands
@@ -41,8 +40,7 @@ namespace r4 {
 // More than 40 functions, most of which call one part.
 class Session {
  public:
-  // `random`: returns 64 random bits; default: the system's. Throws Error{usage} for invalid
-  // fields.
+  // `random`: 64 random bits; default: the system's. Throws Error{usage} for invalid fields.
   explicit Session(SessionOptions options, BoardRole role = BoardRole::control,
                    std::size_t paths = 1, std::function<std::uint64_t()> random = {});
   Session(const Session&) = delete;
@@ -52,7 +50,6 @@ class Session {
   static constexpr std::size_t max_pending = CommandsUnderWay::max_pending;
   static constexpr std::size_t max_stops = CommandsUnderWay::max_stops;
 
-  // --- effects
   // After each call with a time, perform the sendings (with on_sent() for each), then the reports.
   Effects& effects() { return effects_; }
   void on_sent(const Sending& sending, SendResult result, Time now);
@@ -77,8 +74,7 @@ class Session {
   // cancels all other commands, and is confirmed when the board reports this stop's number. If 16
   // stops are under way, returns 0 but sends the stop.
   Ticket send(const Command& command, Time timeout, Time now);
-  // Commands that the board executes together or not at all. For a board without groups, each
-  // command is sent when its predecessor is confirmed. Throws Error{usage} for an empty group.
+  // Executed together, or one by one without groups. Throws Error{usage} for an empty group.
   Ticket send(const Setpoints& group, Time timeout, Time now);
   // Clears the cause of the safe state, if possible, and closes relay 1, the motor supply. The
   // board's state confirms it. Later output commands wait for the end of arm().
@@ -97,8 +93,7 @@ class Session {
   void cancel(Ticket ticket, Time now);
   void end_all(Time now);
 
-  // Sends once; PostRefused reports a refusal. After `sent`, perform the effects, then call
-  // posted().
+  // PostRefused reports a refusal. After `sent`, perform the effects, then call posted().
   PostResult post(const Command& command, Time now);
   // Also no_link until the board has reported whether it executes groups.
   PostResult post(const Setpoints& group, Time now);
@@ -106,25 +101,19 @@ class Session {
   // True if the board executes no groups: post a group's commands one after the other.
   bool posts_apart() const { return board_.groups().state() == GroupSupport::State::apart; }
 
-  // --- gates
-
   // The application watchdog: without feed() for `period`, heartbeats and commands stop. 0: off.
   void watchdog(std::chrono::milliseconds period, Time now);
   void feed(Time now);
   // True: holds back heartbeats and commands. False: resumes them.
   void hold(bool held, Time now);
 
-  // --- reports
-
   BoardRole board_role() const { return outbox_.role(); }
   const LinkStatus& link() const { return status_; }
   bool in_control(Time now) const { return keeper_.in_control(now); }
   DisarmCause disarmed_by() const { return arming_.cause(); }
-  // True after the first heartbeat. Before, an E:CLEAR names the first cause that the board
-  // reports.
+  // True after the first heartbeat. Before, an E:CLEAR names the board's first reported cause.
   bool knows_cause() const { return commands_.cause() != Command::unnamed_cause; }
   const ReceivedState& state() const { return board_.state(); }
-  // The requested fields, as in F; empty: the board keeps its own choice.
   const std::string& fields() { return keeper_.fields().fields(); }
   Statistics statistics(Time now) const;
   const PacketCounters& packets() const { return paths_.counters(); }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's UARTs: commands carry sent bytes, and states carry received bytes.
 #include <fmt/format.h>
 
 #include <string>

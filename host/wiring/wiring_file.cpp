@@ -24,7 +24,6 @@ constexpr std::string_view introduction =
     "# Compare each line with the board's schematic (docs/reference/wiring.md).\n"
     "#     SIGNAL = PLACE [OPTION]     'none' as the place: not connected, or not fitted\n";
 
-// The remark above the signals of each name.
 constexpr std::pair<std::string_view, std::string_view> remarks[] = {
     {"chip", "I2C bus of the chips, D20/D21 or SDA1/SCL1, and the addresses of the chips."},
     {"handle", "Dead-man's handle: 'low' if its input is low while it is held."},

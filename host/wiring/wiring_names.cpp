@@ -26,7 +26,6 @@ std::string pin_name(int number) {
   return is_analog ? fmt::format("A{}", analog) : fmt::format("D{}", number);
 }
 
-// The name of a place, without its option.
 std::string name_of(Terminal terminal, int number) {
   switch (terminal) {
     case Terminal::bus:
@@ -78,7 +77,6 @@ const char* expected(Terminal terminal) {
   return "a line of the MCP23017, GPA0 to GPA7 or GPB0 to GPB7, or none";
 }
 
-// The first number that is not a place.
 int end_of_numbers(Terminal terminal) {
   switch (terminal) {
     case Terminal::bus:

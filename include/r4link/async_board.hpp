@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::AsyncBoard: a board for programs with an Asio loop.
-//
 //     asio::io_context io;
 //     r4::AsyncBoard board(io, "serial:auto");       // or io.get_executor()
 //     board.open();
@@ -158,9 +157,8 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_transfer, Token>(token, command, timeout);
   }
 
-  // void(CommandResult). Confirmed when the board is ACTIVE and accepts this host's commands; for a
-  // watcher, when the link is active or safe. Refused if the paths lead to two boards. `timeout`
-  // may be 0.
+  // void(CommandResult). Confirmed when the board is ACTIVE and obeys this host; for a watcher,
+  // when the link is active or safe. Refused if the paths lead to two boards. `timeout` may be 0.
   template <class Token>
   auto async_wait_active(Duration timeout, Token&& token) {
     require_wait("async_wait_active()", timeout);
@@ -230,7 +228,6 @@ class AsyncBoard {
   Subscription on_arming(std::function<void(DisarmCause)> callback);
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
-  // As Board::record(Recording&).
   void record(Recording& recording);
   // Names a device of this board in later recordings, so that r4 convert can decode it.
   void describe(const Device& device);

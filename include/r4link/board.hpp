@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::Board: a board, opened by URL. Thread-safe, blocking calls with deadlines, and callbacks.
-//
 //     r4::Board board("udp://192.168.0.125");
 //     board.wait_active();
 //     board.arm();                                     // closes relay 1, the motor supply
@@ -74,7 +73,6 @@ struct StatesOptions {
 };
 
 // The states of a board in order, for a loop of your own, from Board::states().
-//
 //     r4::States states = board.states({.lossless = true});
 //     while (const auto state = states.take(1s)) …
 //
@@ -88,7 +86,6 @@ class R4LINK_API States {
   std::optional<ReceivedState> take(Duration timeout);
   // True if the queue is empty and no more states will come.
   bool ended() const;
-  // The number of dropped states.
   std::uint64_t missed() const;
 
   class R4LINK_PRIVATE Queue;
@@ -109,8 +106,7 @@ class R4LINK_API Board {
   // Over one to four paths to the same board: {"serial:auto", "udp://192.168.0.125"}
   // (docs/how-to/redundancy.md). '+' joins several URLs in one text. Throws Error{usage} also for a
   // duplicate URL, and for sim: and replay:, which are separate boards. If a path cannot be opened,
-  // on_event() reports it, and the Board retries every second. Throws Error if no path can be
-  // opened.
+  // on_event() reports it, and the Board retries every second. Throws Error if none can be opened.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   Board(std::initializer_list<std::string_view> urls, BoardOptions options = {},
@@ -311,8 +307,7 @@ class R4LINK_API Board {
   // readings last until the session ends. Adds their fields to the selection of fields(). Call
   // attach() again after on_restart() and after a lost link. `timeout` is for each step. Throws
   // Error{refused} if the device does not answer or is another device; finished steps are not
-  // undone. Throws Error{usage} if a device with another address or name has one of the slots:
-  // i2c().poll_off() frees the slot.
+  // undone. Throws Error{usage} if another device has one of the slots: i2c().poll_off() frees it.
   void attach(const Device& device, Duration timeout = default_timeout);
 
   // One of the user's UARTs, 1 or 2 (docs/how-to/devices.md): setting("uart1", "115200:8N1") turns
@@ -389,10 +384,9 @@ class R4LINK_API Board {
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // Called when a path starts or stops carrying.
   Subscription on_path(std::function<void(const PathStatus&)> callback);
-  // The board restarted, or this computer slept for longer than the board's timeout. The readings
-  // of i2c() and attach() end. The fields are requested again, unless SessionOptions::fields is
-  // empty. After a restart, thresholds of U are 0, and settings (C) may be lost. Called before the
-  // new state.
+  // The board restarted, or this computer slept longer than the board's timeout. The readings of
+  // i2c() and attach() end. The fields are requested again, unless SessionOptions::fields is empty.
+  // A restart sets thresholds of U to 0, and may lose settings (C). Called before the new state.
   Subscription on_restart(std::function<void()> callback);
   // Why output commands are refused; none if armed.
   Subscription on_arming(std::function<void(DisarmCause)> callback);

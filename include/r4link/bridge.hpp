@@ -67,13 +67,11 @@ struct BridgeOptions {
 };
 
 // Passes the datagrams of hosts to a board and back, unchanged, on its own thread. Thread-safe.
-//
 //     r4::Bridge bridge("udp://0.0.0.0:2018", "can://can0?node=3");
 //     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
 //
 // A bridge makes no heartbeats: if the host ends, the board goes safe. It serves one host at a
-// time; an E:STOP of any host passes. It waits for a missing device. Cable-only settings never
-// pass.
+// time; every E:STOP passes. It waits for a missing device. Cable-only settings never pass.
 class R4LINK_API Bridge {
  public:
   // `hosts`: the URL to listen on, as for r4 sim. Patterns of equal size are paired in order

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A datagram on the wire, checked and read in place (paper section 4; docs/reference/protocol.md).
-//
 //     datagram = 1*field "^0x" 1*8HEXDIG "^" [CR] [LF]
 //     field    = name ":" value *("," value) ";"
 //     name     = 1*(%x21-7E except ":" ";" "," "^")

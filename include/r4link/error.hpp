@@ -84,8 +84,7 @@ class R4LINK_API Error : public std::runtime_error {
   Problem problem_;
 };
 
-// A problem of kind open from an error of Asio or the standard library: the system has no thread,
-// descriptor or watch for `thing`.
+// Of kind open, from a system error: the system has no thread, descriptor or watch for `thing`.
 R4LINK_API Problem problem_of(const std::string& thing, const std::system_error& error);
 
 }  // namespace r4

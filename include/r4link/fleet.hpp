@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::Fleet: many boards on one thread.
-//
 //     r4::Fleet fleet({"can://can0?node=0-7", "udp://10.0.0.{1-250}?listen=0"});
 //     fleet.wait_active();
 //     fleet.arm().require();                       // throws if a board is not armed
@@ -68,8 +67,7 @@ class R4LINK_API FleetResults {
   explicit FleetResults(std::vector<FleetResult> results) : results_(std::move(results)) {}
   bool all_confirmed() const;
   std::vector<std::size_t> failed() const;  // the numbers of the boards
-  // If boards have not confirmed, throws Error{refused}: names the first board and counts the other
-  // boards.
+  // If boards have not confirmed, throws Error{refused} about the first one, and counts the others.
   void require() const;
 
   std::size_t size() const { return results_.size(); }
@@ -99,7 +97,6 @@ struct FleetEvent {
   RefusedPost refused{};
   std::uint64_t count = 0;
 };
-// "link", "transport", "arming", "restart", "refused", "missed"; "unknown" for other numbers.
 constexpr const char* to_text(FleetEvent::Kind kind) {
   switch (kind) {
     case FleetEvent::Kind::link:

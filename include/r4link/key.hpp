@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A key that a board and its hosts share (docs/reference/protocol.md "Authentication"), as text:
-//
 //     <id>:<64 hexadecimal digits>      "1:00112233…", the id 1-9
 //
 // A key file and the setting `key` hold this text.
@@ -26,8 +25,7 @@ struct Key {
 R4LINK_API bool operator==(const Key& a, const Key& b);
 inline bool operator!=(const Key& a, const Key& b) { return !(a == b); }
 
-// Refusal::format: not the form above; ::range: the id is not 1-9. `out` is written only on
-// success.
+// Refusal::format: not this form; ::range: the id is not 1-9. `out` is written only on success.
 R4LINK_API Refusal parse_key(Text text, Key& out);
 // Splits "<id>:<rest>", with the refusals of parse_key().
 R4LINK_API Refusal split_key(Text text, std::uint8_t& id, Text& rest);

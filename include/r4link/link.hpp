@@ -95,7 +95,6 @@ enum class PathState : std::uint8_t {
   silent,       // the board has been silent for the timeout
   carrying,
 };
-// "down", "asking", "other board", "silent", "carrying".
 R4LINK_API const char* to_text(PathState state);
 
 struct LinkStatus {
@@ -106,7 +105,6 @@ struct LinkStatus {
   std::uint8_t carrying = 0;  // the paths that carry: bit 0 is the first
   ChipFault chip{};           // the cause of SafeReason::fault, if it is a chip
 
-  // The gravest cause; none if there is no cause.
   std::optional<LinkCause> cause() const { return causes.first(); }
   // True if the link cannot begin because the paths lead to two boards.
   bool cannot_begin() const {
@@ -158,14 +156,12 @@ struct CommandResult {
   // Packet number of the command, as in I2CX of the state. 0: not sent.
   std::uint32_t pnum = 0;
   // `step`: the failed step of a Device's set-up, from 1. `transfer`: the answer to
-  // async_transfer() or to the failed step. If `executed` is 1, a transfer that timed out was
-  // begun.
+  // async_transfer() or to the failed step. If `executed` is 1, a transfer that timed out began.
   std::uint16_t step = 0;
   I2cAnswer transfer{};
 };
 
 // The result of post(). True if the command was sent:
-//
 //     if (!board.post(setpoint)) …        if (board.post(setpoint) == PostResult::not_armed) …
 class PostResult {
  public:
@@ -185,7 +181,6 @@ class PostResult {
  private:
   Value value_;
 };
-// "sent", "not armed", "no link", "queue full".
 R4LINK_API const char* to_text(PostResult result);
 
 struct RefusedPost {

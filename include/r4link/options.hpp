@@ -19,7 +19,6 @@ enum class BoardRole : std::uint8_t {
   control,  // sends heartbeats, and commands when no other host controls the board
   watch,    // reads states without control; may only stop the board
 };
-// "control", "watch"; "unknown" for other numbers.
 constexpr const char* to_text(BoardRole role) {
   switch (role) {
     case BoardRole::control:
@@ -44,9 +43,8 @@ struct SessionOptions {
   std::chrono::milliseconds stop_retry{20};
   // How long a stop is repeated after it is confirmed.
   std::chrono::milliseconds stop_linger{200};
-  // Period of Q:ID; 0: never. Without Q:ID the round trip and ReceivedState::sampled_error stay
-  // unknown. With one path, identity() stays empty until the program calls identify() or sends a
-  // group.
+  // Period of Q:ID; 0: never. Then the round trip and ReceivedState::sampled_error stay unknown,
+  // and with one path identity() stays empty until the program calls identify() or sends a group.
   std::chrono::milliseconds identify_interval{1000};
   // Each host needs its own key id: with a shared id, the slower host looks like a replay.
   std::optional<Key> key;
@@ -66,7 +64,6 @@ struct BoardOptions {
 };
 
 // Reads a key file: one line, `<id>:<64 hexadecimal digits>`, as `r4 key new` makes it.
-//
 //     r4::BoardOptions options;
 //     options.session.key = r4::load_key("/home/me/.r4-key");
 //     r4::Board board("udp://192.168.0.125", options);

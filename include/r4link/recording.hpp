@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::Recording: a file with every datagram of one or several boards (docs/how-to/recordings.md).
-//
 //     r4::Board board("udp://192.168.0.125");
 //     board.record("drive.r4log");
 //

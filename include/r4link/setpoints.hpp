@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::Setpoints: output commands that a board executes in one pass over its chips, or not at all.
-//
 //     board.send({r4::Command::osmc(1, r4::Duty(0.1)), r4::Command::osmc(2, r4::Duty(0.1)),
 //                 r4::Command::servo(3, r4::Microseconds(1500))});
 //
@@ -33,7 +32,6 @@ class R4LINK_API Setpoints {
 
   std::size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
-  // The i-th command, from 0.
   Command operator[](std::size_t i) const;
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The world around a simulated board in this program, for tests of control programs:
-//
 //     r4::sim::SimulatedRobot robot;
 //     r4::Board board(robot.url());              // or your program with this URL
 //     …
@@ -61,7 +60,6 @@ class R4LINK_API SimulatedRobot {
 };
 
 // A board over a bad link, on any transport:
-//
 //     r4::Board board(r4::sim::with_link(robot.url(), "loss=5%,delay=20ms±10,seed=7"));
 //
 // docs/how-to/simulation.md lists the words; other words throw Error{usage}. A seed has the same

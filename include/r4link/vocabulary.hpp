@@ -78,10 +78,7 @@ enum class Handle : std::uint8_t {
   held = 1,
   none = 2,  // the board has no handle
 };
-// "released", "held", "none".
 R4LINK_API const char* to_text(Handle handle);
-
-// --- faults of a chip of the board, or of its wiring
 
 // The number is the value of the FAULT field.
 enum class ChipTrouble : std::uint8_t {
@@ -227,11 +224,9 @@ enum class HostLinkState : std::uint8_t {
   lost,        // no valid datagram of the board came for the timeout
 };
 
-// True if the link is active or safe.
 constexpr bool is_heard(HostLinkState state) {
   return state == HostLinkState::active || state == HostLinkState::safe;
 }
-// "connecting", "active", "safe", "lost".
 R4LINK_API const char* to_text(HostLinkState state);
 
 struct LinkTiming {
@@ -247,8 +242,6 @@ struct PacketCounters {
   std::uint32_t old = 0;
   std::uint32_t restarts = 0;
 };
-
-// --- delivery of a datagram
 
 // A peer, such as one of the hosts at a board's UDP socket. A transport numbers the senders of
 // valid datagrams. `everyone`: the transport's default receivers, and senders of invalid datagrams.

@@ -54,10 +54,8 @@ py::object to_python(const I2cAnswer& answer);
 py::object to_python(const I2cBusReport& report);
 py::object to_python(const UartBytes& received);
 
-// A field of a state in its unit (state.hpp): float in volts, bool for the handle, Drive, Bldc,
-// I2cReading, int.
+// A field's value (state.hpp): float in volts, bool for the handle, Drive, Bldc, I2cReading, int.
 py::object value_of(const State& state, StateField field);
-// The name of the attribute, such as "osmc1".
 std::string attribute_of(StateField field);
 
 }  // namespace r4::python

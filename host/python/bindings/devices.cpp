@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Described devices, for r4link/devices.py.
 #include <pybind11/stl.h>
 
 #include <optional>

@@ -36,12 +36,10 @@ class PythonEnum {
  public:
   using WordOf = std::string (*)(std::uint8_t number);
 
-  // Throws if Python has no member for an enumerator. A number without an enumerator has the text
-  // of 255.
+  // Throws if Python lacks an enumerator. A number without an enumerator has the text of 255.
   PythonEnum(const char* name, WordOf word_of);
 
-  // Throws if no member has the number's text. Newer firmware may send a number without an
-  // enumerator.
+  // Throws if no member has the number's text: newer firmware may send another number.
   pybind11::handle member(std::uint8_t number) const;
   // Takes a member or its text. Throws for anything else.
   std::uint8_t number(pybind11::handle word) const;

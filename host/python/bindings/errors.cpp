@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Error becomes the r4link.errors.Error of its kind and outcome.
 #include <exception>
 
 #include "bindings.hpp"

@@ -80,7 +80,6 @@ void bind_fleet(py::module_& module) {
       .def_readonly("paths", &BoardHealth::paths)
       .def_property_readonly("well", &BoardHealth::well);
 
-  // r4link/fleet.py makes the Error for a board that did not confirm.
   py::class_<FleetResult>(module, "FleetResult")
       .def(pickled<FleetResult>("FleetResult"))
       .def_readonly("board", &FleetResult::board)

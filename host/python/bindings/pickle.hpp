@@ -128,7 +128,6 @@ Value blank() {
   return Value{};
 }
 
-// For copy and pickle. Throws Error for a value of another version.
 template <class Value>
 auto pickled(const char* name) {
   return py::pickle(

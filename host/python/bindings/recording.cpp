@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes recordings, and reads recordings into columns of numbers.
 #include "r4link/recording.hpp"
 
 #include <pybind11/numpy.h>
@@ -66,8 +65,7 @@ std::int32_t kept(double number, FieldForm form) {
   return static_cast<std::int32_t>(std::llround(form == FieldForm::volts ? 100 * number : number));
 }
 
-// The name "bno055_gyro_z". A second device of a kind has its address in the name:
-// "bno055_29_gyro_z".
+// "bno055_gyro_z"; with the address for a second device of a kind: "bno055_29_gyro_z".
 std::string column_of(const Device& device, const DeviceValue& value,
                       const std::vector<Measured>& others) {
   const std::string& kind = device.description().name;
@@ -206,7 +204,6 @@ std::string column_of(StateField field, int which) {
   const std::string_view value = kind_row_of(field).values[which].name;
   std::string name = attribute_of(field);
   if (value.empty()) return name;
-  // In Python these values have shorter or clearer names.
   if (value == "direction") return name + "_dir";
   if (value == "t") return name + "_t_ms";
   if (value == "command") return name + "_pnum";

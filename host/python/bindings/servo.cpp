@@ -10,7 +10,6 @@
 namespace r4::python {
 namespace {
 
-// Also takes an int, but not a bool.
 Degrees degrees_of(const py::object& degrees) {
   if (PyBool_Check(degrees.ptr())) throw py::type_error("degrees must be a number");
   const double value = PyFloat_AsDouble(degrees.ptr());

@@ -55,7 +55,6 @@ void bind_simulation(py::module_& module) {
           "happen", [](const PyRobot& robot, const std::string& words) { robot->happen(words); },
           py::call_guard<py::gil_scoped_release>())
       .def("look", &look);
-  // Throws in the same cases as with_link().
   module.def("check_link", [](const std::string& url, const std::string& link) {
     static_cast<void>(sim::with_link(url, link));
   });

@@ -22,7 +22,6 @@ Duty duty_of(const py::object& duty) {
   return checked_duty(value);
 }
 
-// A motor command takes a duty, or a pwm and a direction.
 void bind_drive(py::class_<OwnCommand>& commands, const char* name,
                 Command (*by_duty)(Channel, Duty), Command (*by_pwm)(Channel, Pwm, Direction)) {
   commands.def_static(

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Listens to a CAN interface: every frame goes to a CanSurvey, and nothing is sent. A CanListener
 // reports the events of the interface as a carrier does. With r4link::asio only.
-//
 //     asio::io_context io;
 //     r4::CanListener bus(io, "can0", {1000000, 0});
 //     bus.survey().on_datagram([](std::uint8_t node, const r4::Datagram& datagram) { … });

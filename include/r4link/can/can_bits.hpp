@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The exact length of a frame on a CAN bus in bits (ISO 11898-1:2015, clauses 10.4 and 10.5).
-//
 //              SOF  id and control  data  CRC   delimiter  ACK  EOF  intermission
 //     classic  |<------- stuffed ----------->|
 //     FD       |<---- stuffed ---->|<-fixed->|

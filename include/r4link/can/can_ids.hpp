@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The 11-bit ids on the bus (docs/reference/can.md). The lower id wins.
-//
 //     0x010    emergency stop from a host   one raw frame, any content, obeyed by every board; with
 //                                           29 bits, the same with a number for its confirmation
 //     0x020+n  board n went safe            one raw frame: the reason

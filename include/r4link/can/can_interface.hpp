@@ -21,7 +21,6 @@ struct CanInterface {
   bool has_controller = false;  // has a bit rate and an error state; false for vcan and vxcan
   int index = 0;
   std::uint32_t tx_queue = 0;  // size of the kernel's queue, in frames
-  // The state of the controller, as far as the driver reports it.
   std::string state;           // "error-active", "error-warning", … "stopped"; empty: not known
   std::uint32_t bit_rate = 0;  // bit/s, nominal for FD; 0: not known
   std::uint32_t data_bit_rate = 0;  // bit/s of FD's data phase; 0: not known

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The boards on a CAN bus, their datagrams and the bus load. Only listens, so it disturbs no host.
-//
 //     CanSurvey survey({1000000, 0});
 //     survey.on_datagram([](std::uint8_t node, const Datagram& datagram) { … });
 //     survey.on_frame(frame, at_us);         // every frame of the bus, see CanListener

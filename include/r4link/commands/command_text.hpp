@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Commands as the text that a board reads (docs/reference/protocol.md): parsed, written, described.
-//
 //     const r4::OwnCommand command = r4::parse_command_text("O:358,1,1");
 //     r4::to_text(command);   // "O:358,1,1"
 //     r4::describe(command);  // "OSMC 1 forward, duty 0.087"
@@ -47,13 +46,11 @@ class OwnCommand {
 R4LINK_API OwnCommand parse_command_text(std::string_view text);
 
 using CommandOrGroup = std::variant<OwnCommand, Setpoints>;
-// Parses "O:358,1,1", or a group, "O:358,1,1;O:358,1,2". Throws Error{usage} with the faulty
-// command.
+// Parses "O:358,1,1", or a group, "O:358,1,1;O:358,1,2". Throws Error{usage} with the fault.
 R4LINK_API CommandOrGroup parse_text(std::string_view text);
 
 // "O:358,1,1". Empty if a text of the command has bytes that a datagram cannot hold.
 R4LINK_API std::string to_text(const Command& command);
-// "O:358,1,1;O:358,1,2"
 R4LINK_API std::string to_text(const Setpoints& group);
 
 // The text for people and logs: printable(), and without a secret: "C:password,...", "C:key,1:...".

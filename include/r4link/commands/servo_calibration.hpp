@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::ServoCalibration: how the pulse of a servo maps to its angle.
-//
 //     const r4::ServoCalibration arm({r4::Microseconds(1000), r4::Degrees(-45)},
 //                                    {r4::Microseconds(2000), r4::Degrees(45)});
 //     board.servo(3).calibrate(arm);

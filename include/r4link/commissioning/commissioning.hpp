@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Checks a board step by step with a person, in the order of the paper's sections 7.3 to 8.5, and
 // learns its wiring (docs/how-to/commissioning.md):
-//
 //     r4::Board board("serial:auto");
 //     r4::commissioning::BoardOnLink tested(board);
 //     r4::commissioning::Commissioning commissioning(tested, person);
@@ -41,7 +40,6 @@ struct Check {
   int row;                 // index in the table of host/commissioning/checks.cpp
   int channel;             // from 1; 1 also for a thing without channels
 };
-// All checks in order.
 R4LINK_API const std::vector<Check>& checks();
 // Throws Error{usage} if there is no such check.
 R4LINK_API const Check& check_named(std::string_view id);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A control loop that runs once per state of the board, and ends if its input is unreliable.
-//
 //     r4::control::LoopOptions options;
 //     options.fields = "ENC1";
 //     options.rest.add(r4::Command::osmc(1, r4::Duty(0)));
@@ -13,7 +12,6 @@
 //
 // Each new state with the needed fields causes a step. The time since the last step is measured on
 // the board's clock, so delays, losses and bursts of the link do not falsify it. The loop ends when
-//
 //     late         the newest state with these fields was sampled longer ago than `late`
 //     not active   the board is safe, or the link to it is not up
 //     disarmed     output commands are refused: Board::disarmed_by()
@@ -55,7 +53,6 @@ struct LoopOptions {
   // Names of the state fields that each step needs, "ENC1,AINSTEER". Request them from the board
   // with SessionOptions::fields or Board::fields().
   std::string fields = {};
-  // Longest age of the newest state with `fields`.
   std::chrono::milliseconds late{100};
   // Time limit for the first state.
   std::chrono::milliseconds first{1000};

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::control::Pid: PID control of one value, with the time as an argument.
-//
 //     r4::control::Pid speed({.kp = 0.4, .ki = 1.6, .feed_forward = 0.5, .rate = 8});
 //     const double duty = speed.step(wanted_m_s, is_m_s, dt_s);
 //
 // The output is the sum of
-//
 //     feed_forward * setpoint       the right output for a perfect model
 //     kp * error                    error = setpoint - measured
 //     ki * integral of the error    held while the output cannot follow the error (anti-windup)

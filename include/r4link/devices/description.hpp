@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::DeviceDescription: an I2C device as a text file (docs/how-to/described-devices.md).
-//
 //     const auto imu = r4::DeviceDescription::load("mpu6050");   // shipped, or "./mine.device"
 //     imu.values[0].decode(bytes, count);                        // "accel_x", m/s2
 //
@@ -21,7 +20,6 @@
 namespace r4 {
 
 // The role of a device on a robot requires these values and units:
-//
 //     imu     accel_x, accel_y, accel_z in m/s2; gyro_x, gyro_y, gyro_z in rad/s; all or none of
 //             quat_w, quat_x, quat_y, quat_z, without a unit
 //     power   voltage in V, current in A
@@ -106,7 +104,6 @@ struct R4LINK_API DeviceDescription {
   static constexpr std::size_t max_text = 65536;  // bytes
   static constexpr std::size_t max_lines = 256;   // of each kind of line
 
-  // The index of the value with this name; empty if there is none.
   std::optional<std::size_t> find(std::string_view value) const;
 
   // Throws Error{data} with the line. `source`: the name of the text in the error.
@@ -114,8 +111,7 @@ struct R4LINK_API DeviceDescription {
   // Loads a shipped description by name, or a file: a name with '/' or with the ending ".device".
   // Throws Error{usage} for an unknown name, Error{open}, Error{permission}, and as parse().
   static DeviceDescription load(const std::string& name_or_path);
-  // The names of the shipped descriptions, and the text of a shipped description. Throws
-  // Error{usage} for an unknown name.
+  // The shipped descriptions' names, and a text by name. Throws Error{usage} for an unknown name.
   static std::vector<std::string> shipped();
   static std::string_view text_of(const std::string& name);
 };

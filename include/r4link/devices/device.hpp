@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::Device: a described device with its address and its slots on the user's I2C bus.
-//
 //     const auto imu = r4::Device::from("bno055@0x28");
 //     board.arm();            // the set-up may write to the device
 //     board.attach(imu);      // checks and sets up the device; the board then reads it

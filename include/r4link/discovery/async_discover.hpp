@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::async_discover(): discover() for programs with an Asio loop. With r4link::asio only.
-//
 //     r4::async_discover(io.get_executor(), {},
 //                        [](std::exception_ptr error, r4::Discovery found) { … });
 //     const auto found = co_await r4::async_discover(io.get_executor(), {}, asio::use_awaitable);

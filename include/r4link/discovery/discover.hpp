@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::discover(): the boards that this computer reaches, with their URLs. `r4 list` prints them.
-//
 //     const r4::Discovery found = r4::discover();
 //     for (const r4::FoundBoard& board : found.boards) fmt::print("{}\n", board.url);
 //     r4::Board board(found.only().url);   // or, shorter, r4::Board board = r4::Board::first();
 //
 // The transports are searched at the same time. Blocks for up to 1.3 s. In a control loop or the
 // loop of an AsyncBoard, use async_discover().
-//
 //   serial  A port with the USB id of a board (2341:0266, Arduino Giga R1), and each port of
 //           `serial_ports`, is opened as by a watcher. The board there is asked for its identity
 //           (Q:ID), at most three times. A program that opens the port meanwhile gets it. If a
@@ -50,7 +48,6 @@ struct FoundBoard {
   std::string place;  // SearchedPort::path, SearchedBus::interface or SearchedNetwork::address
   std::string address = {};  // UDP: IPv4 address
   std::uint8_t node = 0;     // CAN: number on the bus, 0-31
-  // Empty if the board did not report its identity.
   std::optional<BoardIdentity> identity = {};
   // True if a host controls the board; empty: not known.
   std::optional<bool> busy = {};

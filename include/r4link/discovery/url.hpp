@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The URL of a board: the grammar for every transport (docs/reference/transports.md).
-//
 //     url    = scheme ":" ["//" authority] [path] ["?" key "=" value *("&" key "=" value)]
 //     scheme = udp | serial | pty | sim | …        authority = HOST[:PORT] | [IPv6][:PORT]
 //
@@ -29,7 +28,6 @@ class Url {
   std::optional<std::uint16_t> port() const { return port_; }
   const std::string& path() const { return path_; }  // "/dev/ttyACM0", "auto", "can0"
 
-  // The value of a key, if the URL has it.
   R4LINK_API std::optional<std::string> get(std::string_view key) const;
   // Returns the value of a key and removes the key.
   R4LINK_API std::optional<std::string> take(std::string_view key);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One text for the URLs of many boards:
-//
 //     can://can0?node=0-7                      udp://127.0.0.1:20000-20999
 //     udp://10.0.0.{1-250}                     udp://arm-{1,3,07-12}
 //
@@ -8,7 +7,6 @@
 // number that begins with 0 keeps its width: {07-12} is 07, 08 …
 //
 // One text also joins several paths to one board (docs/how-to/redundancy.md):
-//
 //     serial:auto+udp://192.168.0.125          can://can0?node=0-7+can://can1?node=0-7
 //
 // A '+' joins only before the scheme of a URL and its colon. Elsewhere '+' is an ordinary

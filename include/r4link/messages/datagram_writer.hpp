@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Writes one datagram into the caller's buffer.
-//
 //     char buffer[max_datagram];
 //     DatagramWriter w(buffer, sizeof buffer);
 //     w.field("O").value(358).value(1).value(1);
@@ -89,8 +88,7 @@ class R4LINK_API DatagramWriter {
   // Adds only the CRC: the caller has written PNum and T.
   Text finish();
 
-  // The most bytes that finish(pnum, t) adds:
-  // ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
+  // The most that finish(pnum, t) adds: ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
   static constexpr std::size_t trailer_max = 52;
 
  private:

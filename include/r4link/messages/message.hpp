@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The kind of a datagram, and the content of refusals and identities. Portable.
-//
 //     r4::Datagram datagram;
 //     if (r4::read_datagram(bytes, datagram) &&
 //         r4::kind_of(datagram) == r4::MessageKind::state) …   // read_state() of state.hpp

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The packed form of a datagram, for a CAN bus (docs/reference/packed.md). A state of the paper,
 // 154 bytes, becomes 25 bytes, a heartbeat 13 bytes.
-//
 //     packed = head numbers digits checksum
 //     head     1 byte: 10 LLL SSS: version 1, the layout, number of digits of PNum and T
 //     numbers  PNum and T in hexadecimal digits of 4 bits, by the layout

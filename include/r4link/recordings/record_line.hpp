@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Writes and reads the lines of a recording.
-//
 //     # r4log 1 by r4 0.1.0
 //     # path 1 serial:///dev/ttyACM0 left-arm
 //     # device 1 bno055@0x28:1 name bno055\x0atitle…

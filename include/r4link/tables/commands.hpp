@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The commands of the board (docs/reference/protocol.md, section 3), from board.def: a row for each
 // kind of command and for each kind of value.
-//
 //     r4::row_of(r4::CommandKind::servo).channels                // 16
 //     r4::row_of(r4::CommandValue::pulse).max                    // 2500, microseconds
 #pragma once

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The state fields (docs/reference/protocol.md), from board.def. A field has a kind and a channel.
 // A kind has the form, the units and the State member of its values.
-//
 //     for (const StateFieldRow& row : state_fields) …   in the order of the wire
 //     state_field(FieldKind::osmc, 2)                   StateField::osmc2
 //     numbers_of(state, StateField::osmc2)[0]           its duty cycle, 0-4095

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Transports of your own, with functions that may block:
-//
 //     auto radio = std::make_shared<Radio>();                              // an OwnTransport
 //     r4::Board board(r4::carrier_on(radio));
 //     auto bus = std::make_shared<Adapter>();                              // an OwnCanBus
@@ -10,10 +9,9 @@
 // continues. A datagram that waits for 100 ms is dropped, unless it is a stop.
 //
 // If a function throws a std::exception, the transport is down: an event reports it, close() is
-// called, and then open() five times a second until it succeeds. An exception from the first open()
-// is thrown where the board is opened. Opening a board waits for the first open(), without limit;
-// the end of a link waits at most 1 s for these functions. A class without a separate thread
-// implements Carrier (carrier.hpp).
+// called, and then open() five times a second until it succeeds. Opening a board waits for the
+// first open(), without limit, and throws its exception. The end of a link waits at most 1 s for
+// these functions. A class without a separate thread implements Carrier (carrier.hpp).
 #pragma once
 
 #include <cstdint>

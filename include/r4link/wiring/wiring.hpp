@@ -106,13 +106,11 @@ inline bool operator!=(const Wiring& a, const Wiring& b) { return !(a == b); }
 // The plan in tables/board.def: the wiring of a board to which no wiring was given.
 R4LINK_API Wiring plan_wiring();
 
-// The origin of a board's wiring.
 enum class WiringSource : std::uint8_t {
   plan,     // no wiring was given, and the plan was not confirmed
   given,    // the owner gave it
   damaged,  // the stored wiring cannot be read: nothing is connected
 };
-// "plan", "given", "damaged".
 R4LINK_API const char* to_text(WiringSource source);
 
 struct BoardWiring {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A wiring in words, and as a text file (docs/reference/wiring.md):
-//
 //     r4-wiring 1
 //     stepper 1 step = D2                  # a signal and its place
 //     stepper 1 direction = D34 inverted   # with its option
@@ -20,8 +19,7 @@
 
 namespace r4 {
 
-// `signal`: an index in Wiring, 0 to signal_count - 1.
-// "stepper 1 direction", "servo 16", "handle".
+// `signal`: an index in Wiring, 0 to signal_count - 1. Such as "stepper 1 direction", "handle".
 R4LINK_API std::string signal_name(int signal);
 // The inverse; throws Error{data}.
 R4LINK_API int signal_named(std::string_view name);

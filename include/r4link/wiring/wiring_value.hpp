@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A wiring as the value of the setting `wiring`, sent and stored: `1:<two hexadecimal digits for
-// each signal>:<CRC-32 of the text before this colon>`. The 1 is the version of the list of
-// signals.
+// each signal>:<CRC-32 of the text before this colon>`. The 1 is the version of the signal list.
 #pragma once
 
 #include <cstddef>

@@ -81,7 +81,6 @@ class Call {
 };
 using CallPtr = std::shared_ptr<Call>;
 
-// A request is an OwnCommand, Setpoints, or a name such as "arm()".
 std::string name_of(const std::string& request) { return request; }
 template <class Request>
 std::string name_of(const Request& request) {
@@ -140,7 +139,6 @@ class Calls {
       board.async_arm(Ms(ms), std::move(handler));
     });
   }
-  // `answer(board)` returns the value after the board has answered.
   template <class Answer>
   CallPtr ask(const Command& question, int ms, Answer answer) {
     return begin(

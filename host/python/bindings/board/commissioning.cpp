@@ -22,7 +22,6 @@ using commissioning::Question;
 
 constexpr const char* answer_kinds[] = {"yes_no", "number", "choice"};
 
-// Calls the methods of an r4link.commissioning.Person, through _Asked.
 class PyPerson final : public commissioning::Person {
  public:
   explicit PyPerson(py::object person) : person_(std::move(person)) {}
