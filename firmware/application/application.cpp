@@ -114,6 +114,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   }
 }
 
+// Datagrams that waited during a standstill arrived after the last turn, at an unknown time.
 void Application::turn(std::uint32_t now_ms) {
   if (now_ms - turned_ms_ > standstill_ms) {
     for (PortSlot& slot : ports_) {

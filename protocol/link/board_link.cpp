@@ -95,7 +95,8 @@ void BoardLink::resume(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   feed(heartbeat, at_ms);
 }
 
-// `at_ms`: the earliest possible arrival, so that no overtaken command's age is underestimated.
+// `at_ms`: the earliest possible arrival, so that no overtaken command's age is underestimated. A
+// command that arrived later in the same backlog has a newer number.
 void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   fed_ms_ = at_ms;
   const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);

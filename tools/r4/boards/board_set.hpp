@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The boards of a command on one event loop. Order of calls: open(), end_by_signal(), run() until a
-// signal, the duration or stop(), leave(), require_heard().
+// The boards of a command on one event loop. Order of calls: on_state() of each board, open(),
+// end_by_signal(), run() until a signal, the duration or stop(), leave(), require_heard().
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -77,6 +77,7 @@ void DeviceTopics::on_state(const State& state, WallTime sampled) {
     if (!state.present.has(topic.device.field(topic.value))) continue;
     const DeviceReading reading = topic.device.reading(state, topic.value);
     // A distance outside the device's range is published too: nothing within reach, or too near.
+    // A device that is not set up has no valid measurement.
     const bool told = topic.device.description().role == DeviceRole::range
                           ? topic.device.is_set_up(state).value_or(true) &&
                                 any_number_of(topic.device, state, topic.value).has_value()

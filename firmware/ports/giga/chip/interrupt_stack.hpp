@@ -8,6 +8,7 @@
 //
 // The lowest words of the first two stacks hold a mark. The guard's interrupt checks the marks each
 // millisecond. If a mark is overwritten, the boot ends with all outputs off (fault.hpp).
+// tests/giga/stack_bounds.py checks that our handlers fit by the compiler's figures.
 #pragma once
 
 #include <cstdint>
