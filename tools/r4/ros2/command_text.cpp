@@ -75,7 +75,8 @@ std::vector<OwnCommand> commands_of(std::string_view text) {
 }
 
 Problem for_a_node(Problem problem, DisarmCause cause) {
-  if (is_earlier(cause)) problem.fix = "clear it on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm";
+  if (is_earlier(cause))
+    problem.fix = "clear it on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm";
   return problem;
 }
 
