@@ -99,7 +99,7 @@ class CallbackThread {
   void run();
   bool take(Notice& notice, std::function<void()>& task);
   void call(const Notice& notice);
-  // Ends early if a callback closes the board.
+  // If a callback closes the board, later callbacks are not called.
   template <class Kind>
   void call_each(const Subscribers<Kind>& callbacks, const Kind& news) {
     callbacks.each([&](auto& one) {

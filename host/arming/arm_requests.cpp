@@ -78,7 +78,8 @@ std::optional<Command> ArmRequests::next_step(SafeReason reason, Time now) {
   return {};
 }
 
-// After E:CLEAR, the board's next reason decides. A cancelled step ends with its requests.
+// A confirmed E:CLEAR changes nothing here, because next_step() checks the board's reason. Steps
+// are cancelled only when their requests end.
 void ArmRequests::on_step(CommandKind kind, const CommandResult& result, SafeReason reason,
                           bool supply_open, Time now) {
   if (requests_.empty()) return;

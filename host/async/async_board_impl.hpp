@@ -196,7 +196,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   std::vector<const Device*> attaching;
   std::uint32_t boots = 0;           // number of restarts of the board
   const std::uint32_t heartbeat_ms;  // interval of this host's heartbeats
-  const Time board_timeout;          // the board's timeout
+  const Time board_timeout;
   Session session;
   BoardIdentity identity;
 

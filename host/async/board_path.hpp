@@ -44,7 +44,7 @@ class BoardPath final : public Carrier::Handler {
   const std::unique_ptr<Carrier> carrier;
   RecordingTap tap;
   bool opened = false;
-  std::optional<Problem> trouble;  // the last reported reason why it could not be opened
+  std::optional<Problem> trouble;  // the last reason why the transport could not be opened
 
  private:
   Owner& owner_;

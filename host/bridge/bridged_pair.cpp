@@ -158,7 +158,8 @@ void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now
     ++hosts_.counters.kept_out;
     return answer(datagram, Refusal::busy, 0, from, now);  // as the board does
   }
-  if (!trusted) audience_.listen(from, now);  // to get a heartbeat of the board for its echo
+  // A host needs a heartbeat of the board for its echo.
+  if (!trusted) audience_.listen(from, now);
   pass_on(datagram, from, trusted, now);
   follow_hosts(now);
 }
@@ -171,7 +172,7 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
   const bool asks_who = is_single(datagram, Text("Q")) && command.values() == "ID";
   if (!asks_who && !is_allowed(datagram, MessageKind::command, from, now)) return;
   if (!asks_who && !known_.knows(from, sid, now)) {
-    ++hosts_.counters.kept_out;  // without an answer, because its heartbeats are answered
+    ++hosts_.counters.kept_out;  // without an answer, because the host's heartbeats are answered
     return;
   }
   if (!trusted && !may_ask(now)) return;

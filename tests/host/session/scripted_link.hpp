@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host session in virtual time, with a board whose every datagram the test writes.
+// A host session in virtual time. The test writes every datagram of the board.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -89,7 +89,7 @@ rc::Gen<Content> any_content() {
       content.time_ms = *rc::gen::arbitrary<std::uint64_t>();
       insert("T", std::to_string(*content.time_ms));
     }
-    // Sometimes exactly at the limit.
+    // A test may lengthen PAD until the datagram is about as long as the limit.
     if (*rc::gen::arbitrary<bool>()) content.fields.emplace_back("PAD", "");
     return content;
   });

@@ -18,7 +18,7 @@ namespace r4::tool {
 
 class CsvSink final : public Sink {
  public:
-  // Device values get columns too: of `devices`, or else of the recording's devices.
+  // Device values get columns too. If `devices` is empty, the recording's devices are used.
   explicit CsvSink(Output& output, std::vector<Device> devices = {});
   bool wants_survey() const override { return true; }
   void survey(const RecordedPath& path) override { names_.on_path(path); }

@@ -37,7 +37,8 @@ class Drivers {
   using Time = BootClock::time_point;
   using Duration = std::chrono::milliseconds;
 
-  // Deadline 0: only departed publishers are missed.
+  // An output is stopped after its publisher was silent for `deadline`, or has disappeared. 0: a
+  // silent publisher is allowed.
   explicit Drivers(Duration deadline) : deadline_(deadline) {}
 
   static bool rests(const Command& command);

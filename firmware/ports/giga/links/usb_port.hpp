@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// USB serial as a port of the application: one datagram a line, and the line `report` for the
-// board. The core's Serial.write() waits for ever if a program does not read. So send_nb() sends
-// lines, one packet at a time, whole or not at all. The newest state replaces older states. A
-// low-priority interrupt takes input and detects a stop while the loop is busy. While the ring is
-// full, input waits at the host. From the loop, except take_in() and listen().
+// USB serial as a port of the application. A line is a datagram, or `report`, which requests the
+// board's report. If a program does not read, the core's Serial.write() waits for ever. So the
+// core's send_nb() sends lines, one packet at a time, whole or not at all. The newest state
+// replaces older states. A low-priority interrupt takes input and detects a stop while the loop is
+// busy. While the ring is full, input waits at the host. Call all functions from the loop, except
+// take_in() and listen().
 #pragma once
 
 #include <cstdint>

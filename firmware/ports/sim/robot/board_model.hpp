@@ -75,7 +75,7 @@ class BoardModel {
   firmware::BoardPins microcontroller_pins(const Wiring& wiring);
   firmware::InputPin& input_at(Place place);
   Pins pins() const;
-  // False if pins() cannot have changed, which saves time: bus idle, all steppers stopped.
+  // True if pins() may have changed: shortly after a transfer, a step or disturb_pins().
   bool pins_may_differ();
   // Call after a change of the chips without a transfer.
   void disturb_pins() { disturbed_ms_ = time_ms_; }

@@ -78,7 +78,7 @@ inline KernelIsotpOptions kernel_of(const Form& form) {
   return options;
 }
 
-// Two different lengths have different contents.
+// Pseudo-random bytes. Each size has its own sequence.
 inline std::string content_of(std::uint32_t size) {
   std::mt19937 random(size);
   std::string bytes(size, '\0');
