@@ -12,7 +12,7 @@
 
 inline constexpr double podcar_cruise_m_s = 1.0;
 
-// The board goes safe if US 1 sees an obstacle. A board that restarts forgets this threshold.
+// If US 1 sees an obstacle, the board goes safe. A board that restarts forgets this threshold.
 void guard_podcar(r4::Board& board);
 
 // Arms the board, then calls guard_podcar(). If the board restarts after arming, it is disarmed and

@@ -31,7 +31,7 @@ namespace {
 
 volatile std::sig_atomic_t ended = 0;
 
-// False if the program ends before start is pressed. run_loop() ends when the board restarts, so
+// False if the program ends before start is pressed. When the board restarts, run_loop() ends, so
 // this function gets the first state after a restart. `restarts`: the known restarts of the board.
 bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics,
                     std::uint32_t& restarts) {

@@ -14,7 +14,7 @@
 //     automatic   cmd_vel while its messages arrive; else the goal; else the vehicle stands
 //     manual      the joystick while hold is held; else the vehicle stands. Start ends manual
 //
-// end() drops the goal and the commands. It is called
+// end() drops the goal and the commands. end() is called
 //     by the stop button,
 //     if the joystick is silent, because the person could not stop the vehicle,
 //     by Topics if a stop may be lost,
@@ -68,9 +68,9 @@ class Pilot {
   // The reason for refusing the goal; empty if the goal is accepted.
   std::string on_goal(const Waypoint& goal, const r4::control::Pose& from, Time now);
 
-  // Call it when the board is armed and the loop begins. Of earlier messages only a stop counts.
+  // The board is armed and the loop begins. Earlier messages are ignored, except a stop.
   void begin(Time now);
-  // The motion, within the limits of podcar_geometry. If there is none, stop at once; why() has the
+  // The motion, within the limits of podcar_geometry. If empty, stop at once; why() has the
   // reason.
   std::optional<r4::control::Twist> wish(const r4::control::Pose& pose, Time now);
   void end(std::string why);
@@ -90,7 +90,7 @@ class Pilot {
   std::string why_;
 
   Time heard_;              // time of the newest joystick message
-  std::uint64_t from_ = 0;  // its publisher
+  std::uint64_t from_ = 0;  // the publisher of that message
   bool start_was_up_ = false;
   bool held_ = false;
   r4::control::Twist stick_;

@@ -38,17 +38,17 @@ class Podcar {
  public:
   // Sets the position, before the first state.
   void begin_at(const r4::control::Pose& pose) { odometry_.reset(pose); }
-  // Call it when the board is armed: clears what the controllers learned in the previous drive.
+  // After the board is armed: clears what the controllers learned in the previous drive.
   void begin_drive();
-  // Call it when the board has restarted: its counter begins at 0 without any movement.
+  // After the board has restarted: its counter begins at 0 without any movement.
   void on_restart() { wheel_.reset(); }
-  // Call it for each state. False if the steering sensor is not plausible: do not drive then.
+  // Uses each new state. False if the steering sensor is not plausible: then do not drive.
   bool sense(const r4::State& state);
-  // The setpoints for this motion. Call it after sense().
+  // The setpoints for this motion. Call sense() first.
   r4::Setpoints drive(const r4::control::Twist& wish, double dt_s);
   // True if the vehicle follows drive(). False if the steering does not follow for half a second,
-  // or if the vehicle is much too fast, as with an encoder that counts backwards. Do not drive
-  // then.
+  // or if the vehicle is much too fast, as with an encoder that counts backwards. If false, do
+  // not drive.
   bool obeys() const;
 
   const r4::control::Pose& pose() const { return odometry_.pose(); }

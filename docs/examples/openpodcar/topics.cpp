@@ -20,8 +20,8 @@ namespace {
 
 using Time = Pilot::Time;
 
-// At most this many messages wait while the board is armed, and the newest are kept: three seconds
-// while no stick moves, less while a stick moves, because joy_node publishes each change.
+// While the board is armed, at most this many messages wait: the newest, of three seconds while
+// no stick moves, of less time while a stick moves, because joy_node publishes each change.
 constexpr int most_joys = 64;
 constexpr const char* this_computer =
     R"(<Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>)"

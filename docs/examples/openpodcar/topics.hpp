@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The vehicle's topics in a ROS 2 graph, through Cyclone DDS without ROS. Every program in the
-// graph may drive. The graph is limited to this computer, unless ROS_AUTOMATIC_DISCOVERY_RANGE is
-// SUBNET or CYCLONEDDS_URI has other interfaces. ROS_DOMAIN_ID is the number of the graph.
+// graph may drive. Unless ROS_AUTOMATIC_DISCOVERY_RANGE is SUBNET or CYCLONEDDS_URI has other
+// interfaces, the graph is limited to this computer. ROS_DOMAIN_ID is the number of the graph.
 //
 // No thread of DDS calls this class: messages wait in the readers until take().
 #pragma once

@@ -24,7 +24,7 @@ class Hand(Protocol):
     ended: bool  # the person ended the drive, or the device is disconnected
     stop: bool  # the person requests an emergency stop
 
-    def begin(self) -> None: ...  # call it when the board is armed; of earlier input only a stop counts
+    def begin(self) -> None: ...  # the board is armed; earlier input is ignored, except a stop
 
     def wish(self) -> Wish: ...
 

@@ -55,7 +55,7 @@ class Scout:
         return self._drive.twist(control.WheelSpeeds(*(wheel.speed for wheel in self._wheels))).forward
 
     def duties(self, twist: control.Twist, dt: float) -> tuple[float, ...]:
-        """The duties of the four motors, -1 to 1. Call it after sense()."""
+        """The duties of the four motors, -1 to 1. Call sense() first."""
         if twist == (0, 0) and all(abs(wheel.speed) < 0.02 for wheel in self._wheels):
             for pid in self._pids:
                 pid.reset()

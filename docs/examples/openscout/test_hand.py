@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wishes from the events of a gamepad and from keys."""
+"""The wishes from the events of a gamepad and of a keyboard."""
 import os
 import pty
 import struct
@@ -30,7 +30,7 @@ def test_the_gamepad_drives_while_its_shoulder_button_is_held(plugged):
     happens(3, Gamepad.ABS_Y, -32768)
     assert pad.wish().twist == (0, 0)
     happens(1, Gamepad.SHOULDER, 1)
-    pad.begin()  # pressed before arming: does not count
+    pad.begin()  # pressed before arming: ignored
     assert pad.wish().twist == (0, 0)
     happens(1, Gamepad.SHOULDER, 0)
     happens(1, Gamepad.SHOULDER, 1)
@@ -105,7 +105,7 @@ def test_the_keyboard_drives_as_long_as_a_key_is_held(terminal):
     assert keyboard.wish() == ((0, 0), scout.ARM_REST)
     for key, twist in ((b'w', (hand.SPEED, 0)), (b's', (-hand.SPEED, 0)), (b'a', (0, hand.TURN)), (b'd', (0, -hand.TURN))):
         assert terminal.type(key).twist == twist
-        terminal.now += 0.5  # until the terminal repeats it
+        terminal.now += 0.5  # until the terminal repeats the key
         assert keyboard.wish().twist == twist
         terminal.now += hand.HOLD
         assert keyboard.wish().twist == (0, 0)

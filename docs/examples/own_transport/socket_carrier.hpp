@@ -40,8 +40,8 @@ class SocketCarrier final : public r4::Carrier {
   const r4::CarrierCounters& counters() const override { return counters_; }
 
  private:
-  // Runs on a separate thread, which may wait. Posts each datagram to the loop, which drops it
-  // after close().
+  // Runs on a separate thread, which may wait. Posts each datagram to the loop. After close(),
+  // the loop drops these datagrams.
   void read(const std::weak_ptr<int>& opening) {
     char bytes[r4::max_datagram];
     for (ssize_t size = 1; size > 0;) {

@@ -22,7 +22,7 @@ def main(url: str) -> None:
                 break
         board.stop()
         print(f'link: {board.link.state}, reason {board.link.reason}')
-        board.send(r4link.Command.clear())  # a stop is latched until then
+        board.send(r4link.Command.clear())  # a stop is latched until E:CLEAR
 
 
 if __name__ == '__main__':

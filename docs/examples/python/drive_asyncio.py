@@ -22,7 +22,7 @@ async def main(url: str) -> None:
                 break
         await board.stop()
         print(f'link: {board.link.state}, reason {board.link.reason}')
-        await board.send(Command.clear())  # a stop is latched until then
+        await board.send(Command.clear())  # a stop is latched until E:CLEAR
 
 
 if __name__ == '__main__':

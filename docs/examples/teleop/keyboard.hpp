@@ -16,7 +16,7 @@ class Keyboard {
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;
 
-  // The newest key; waits at most this long. Empty if there is no key, or if the input has ended
+  // The newest key within `at_most`. Empty if there is no key, or if the input has ended
   // (at_end()).
   std::optional<char> key(std::chrono::milliseconds at_most);
   bool at_end() const { return at_end_; }

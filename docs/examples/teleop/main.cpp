@@ -100,7 +100,7 @@ void attempt(Act act) {
 }
 
 void stop(r4::Board& board) {
-  board.stop(patience);  // throws if the board does not confirm it
+  board.stop(patience);  // throws if the board does not confirm the stop
   std::printf("stopped\n");
 }
 
@@ -110,7 +110,7 @@ void teleoperate(r4::Board& board, Keyboard& keyboard) {
     std::printf("refused by the board or on the way: OSMC %d\n", refused.command.channel);
   });
   board.next_state(3s);  // the board is connected; a stop may be latched
-  // After a lost link the motors stay off until e, because the driver may not see the robot.
+  // After a lost link motors stay off until e is pressed, because the driver may not see the robot.
   board.setting("recovery", "rearm");
   board.watchdog(watchdog);
   std::printf("e arms, q ends\n");
