@@ -50,7 +50,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   std::shared_ptr<const Part> execute(const Command& command, Duration timeout);
   void execute(const Setpoints& setpoints, Duration timeout);
   void execute(const std::string& request, Start start, Duration timeout);
-  // The same, but returns any outcome. Throws Error if it is unknown or the board is closed.
+  // As execute(), but returns any outcome. Throws Error for an unknown outcome or a closed board.
   std::shared_ptr<const Part> run(const std::string& text, Start start, Duration timeout,
                                   bool stop = false);
   PostResult post(const Command& command);
@@ -69,14 +69,14 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
       return !queue;
     });
   }
-  // Returns the result of `ask` on the loop; `last` if the board is closed.
+  // Returns the result of `ask` on the loop. If the board is closed: `last`.
   template <class Report, class Ask>
   Report report(std::string_view what, const Report& last, Ask ask) {
     Report now;
     return run_on_loop(what, [&] { now = ask(); }) ? now : read(last);
   }
 
-  // Both throw Error{usage} if `channel` is not 1-16.
+  // These functions throw Error{usage} if `channel` is not 1-16.
   void calibrate_servo(int channel, const ServoCalibration& calibration);
   ServoCalibration servo_calibration(int channel);
 

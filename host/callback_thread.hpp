@@ -5,8 +5,9 @@
 // A callback may wait for the board: heartbeats and commands continue. But a hanging callback
 // leaves the robot unattended, so the loop stops the heartbeats when busy_for() exceeds a limit.
 //
-// The link does not wait for callbacks. A newer state replaces a waiting state. While 32 notices
-// wait, refusals and warnings are dropped; while 64 wait, the oldest. notify() allocates nothing.
+// The link does not wait for callbacks. A newer state replaces a waiting state. From 32 waiting
+// notices on, refusals and warnings are dropped, at 64 the oldest notice. notify() allocates
+// nothing.
 #pragma once
 
 #include <atomic>
@@ -50,7 +51,7 @@ class CallbackThread {
   CallbackThread(const CallbackThread&) = delete;
   CallbackThread& operator=(const CallbackThread&) = delete;
 
-  // Call it before start(). `take` removes and returns the waiting bytes.
+  // Call take_uart() before start(). `take` removes and returns the waiting bytes.
   void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
   // Keeps `owner` until the thread ends.
   void start(std::shared_ptr<void> owner);
@@ -60,7 +61,7 @@ class CallbackThread {
   void notify(Notice notice);
   std::optional<Clock::duration> busy_for() const;
 
-  // Adds a callback. It is called with the newest notice, if any, and with each new notice.
+  // Adds a callback, which is called with the newest notice, if any, and with each new notice.
   template <class Kind>
   Subscription add(std::function<void(const Kind&)> callback) {
     return add(std::get<Subscribers<Kind>>(callbacks_), std::move(callback));

@@ -252,7 +252,7 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
         Problem why = failed_transfer({}, result.transfer.outcome);
         return {std::move(why.reason), std::move(why.fix)};
       }
-      // Without a code, the board did not refuse it: the link cannot begin.
+      // Without a code, the board did not refuse the command: the link cannot begin.
       if (result.code == Refusal::none) return link_words(link);
       words = refusal_words(command, result.code, link);
       break;

@@ -90,7 +90,7 @@ class States::Queue {
     first_ = (first_ + 1) % ring_.size();
     --count_;
   }
-  // A short queue stays small. At its full size it allocates nothing.
+  // A short queue stays small. At full size, a queue allocates nothing.
   void grow() {
     std::rotate(ring_.begin(), ring_.begin() + static_cast<std::ptrdiff_t>(first_), ring_.end());
     first_ = 0;

@@ -4,9 +4,9 @@
 //                  ^                                                                  |
 //                  +---- the board has executed the step (E:CLEAR or R:1,On) ---------+
 //
-//     It ends confirmed when the program is armed; refused when the board refuses a step; not_armed
-//     when arming is impossible, or a cause is newer than the call; timed_out, cancelled and closed
-//     like a command.
+//     A call ends confirmed when the program is armed; refused when the board refuses a step;
+//     not_armed when arming is impossible, or a cause is newer than the call; timed_out, cancelled
+//     and closed like a command.
 //
 // Several calls share the steps, and end together. Later output commands wait for the end.
 #pragma once
@@ -52,7 +52,7 @@ class ArmRequests {
 
   // True, once, if all requests ended during a step: the caller then drops the step.
   bool take_abandoned() { return std::exchange(abandoned_, false); }
-  // Call it while the board obeys and no step is under way. `reason`: why the outputs are off.
+  // Call next_step() while the board obeys and no step runs. `reason`: why the outputs are off.
   std::optional<Command> next_step(SafeReason reason, Time now);
   // The step has ended. `supply_open`: the board's states show that relay 1 is open.
   void on_step(CommandKind kind, const CommandResult& result, SafeReason reason, bool supply_open,

@@ -17,8 +17,8 @@
 // (docs/reference/safety.md), shows whether the board restored its outputs (`recovery`). arm()
 // clears the first cause that it finds, and each cause that the first cause hid, once. A new stop,
 // released handle or obstacle is not cleared, and ends the arm(). A stop, a watchdog or a fault is
-// not cleared if it may be older than the session, because a restarted program would drive off. It
-// is new only after the board was without it. A fault since the board's start is not cleared.
+// not cleared if it may be older than the session, because a restarted program would drive off. A
+// cause is new only after the board was free of it. A fault since the board's start is not cleared.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,7 @@ class ArmingMachine {
   // This computer slept: a new session begins, and any cause may be older than the session.
   void on_sleep();
   void on_outage() { outage_ = true; }
-  // Call it for each state that shows relay 1 while the board is not in the safe state.
+  // Call on_supply() for each state that shows relay 1 while the board is not in the safe state.
   void on_supply(bool closed);
 
   void begin();

@@ -64,7 +64,7 @@ AsyncBoard::executor_type AsyncBoard::get_executor() const noexcept {
   return impl_->io.get_executor();
 }
 
-// Posted, because a slot must not lose its handler while the handler runs.
+// The cancellation is posted, because a slot must not lose its handler while the handler runs.
 void AsyncBoard::Cancel::operator()(asio::cancellation_type) const {
   const std::shared_ptr<Impl> impl = impl_.lock();
   if (impl) asio::post(impl->io, [impl, command = command_] { impl->cancel(command); });

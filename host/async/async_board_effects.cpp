@@ -60,7 +60,7 @@ void AsyncBoard::Impl::notify_all() {
       [&](const LinkChanged& event) {
         paths[0].tap.on_link(event.status);
         notify_paths(event.status);
-        call(callbacks.link, session.link());  // an earlier callback may have changed it
+        call(callbacks.link, session.link());  // an earlier callback may have changed the link
       },
       [&](const CommandEnded& event) { waits.end(event.ticket, event.result); },
       [&](const BoardRestarted&) {
@@ -69,7 +69,7 @@ void AsyncBoard::Impl::notify_all() {
         call(callbacks.restart);
       },
       [&](const ArmingChanged&) {
-        callbacks.arming.each([&](auto& one) {  // an earlier callback may have changed it
+        callbacks.arming.each([&](auto& one) {  // an earlier callback may have changed the cause
           if (is_open()) guarded([&] { one(session.disarmed_by()); });
         });
       },

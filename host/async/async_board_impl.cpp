@@ -12,7 +12,7 @@ namespace r4 {
 
 namespace {
 
-// The session uses the steady clock. `clock_start` is the system time at its zero.
+// The session uses the steady clock. `clock_start` is the system time at the zero of this clock.
 SessionOptions with_clock(SessionOptions options, Time now) {
   const auto epoch = std::chrono::system_clock::now().time_since_epoch();
   options.clock_start = std::chrono::duration_cast<Time>(epoch) - now;
@@ -75,7 +75,7 @@ void AsyncBoard::Impl::settle() {
   const Inside inside(depth);
   for (;;) {
     notify_all();
-    // A dispatched handler may start commands. Their ends are appended.
+    // A dispatched handler may start commands. The ends of these commands are appended.
     while (std::optional<Waits::Ended> ended = waits.take_ended()) {
       guarded([&] { ended->completion.release()->complete(ended->result, how); });
     }
@@ -99,7 +99,7 @@ bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
                  ? is_heard(link.state)
                  : link.state == HostLinkState::active && link.in_control;
     case Waits::For::answer:
-      // 0: the state has no answer.
+      // With a pnum of 0, the state has no answer.
       return condition.pnum != 0 && session.state().i2c_answer.pnum == condition.pnum;
     case Waits::For::time:
       return now >= condition.deadline;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams that came while the loop was delayed. Only the newest state of a backlog is reported.
-// Datagrams from before a sleep of this computer are dropped.
+// Datagrams that arrived while the loop was delayed. Only the newest state of a backlog is
+// reported. Datagrams from before a sleep of this computer are dropped.
 //     live --the loop was delayed------> in backlog --the transport is drained--> live
 //     any  --sleep----> waking     --drained, or the timer expired twice--> live
 #pragma once
@@ -41,12 +41,12 @@ class Backlog {
     rings_ = size_ == 0 ? 0 : rings_ + 1;
     return rings_ >= 2;
   }
-  // Takes the kept state; empty if there is none. Valid until the next keep().
+  // Removes and returns the kept state; empty if no state is kept. Valid until the next keep().
   Text take() { return {state_.data(), std::exchange(size_, 0)}; }
 
  private:
   bool behind_ = false;
-  int waking_ = 0;  // timer expiries until no datagram from before a sleep can come
+  int waking_ = 0;  // timer expiries until no datagram from before a sleep can arrive
   int rings_ = 0;   // timer expiries while a state is kept
   std::array<char, max_datagram> state_;
   std::size_t size_ = 0;

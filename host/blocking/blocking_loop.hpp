@@ -139,7 +139,7 @@ class BlockingLoop {
 
   // Throws std::system_error if the system has no thread left.
   void start(std::function<void()> loop) { thread_ = std::thread(std::move(loop)); }
-  // Runs `shut` on the loop unless it is closed, and joins the thread. Idempotent.
+  // Unless the loop is closed, runs `shut` on the loop. Joins the thread. Idempotent.
   void close(std::function<void()> shut);
 
   // The first step of `shut`. False if already closed; otherwise calls `last` under the lock.

@@ -67,7 +67,7 @@ struct Bridge::Impl {
 
   ~Impl() { close(); }
 
-  // Throws unless a bridge without a key may serve these hosts. Warns if it is open to everyone.
+  // Throws unless a bridge without a key may serve these hosts. An open bridge causes a warning.
   void permit(const BridgedUrls& urls, bool open) {
     const std::string danger = "everyone who reaches it may drive the board at " + urls.board +
                                ", which asks for no key at its cable";

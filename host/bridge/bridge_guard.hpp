@@ -37,7 +37,7 @@ class BridgeGuard {
   BridgeGuard(const std::vector<Key>& keys, bool trusted);
 
   void on_board_datagram(const Datagram& datagram, MessageKind kind, Time now);
-  // The board's transport is down. It may reconnect to another board.
+  // The board's transport is down. The transport may reconnect to another board.
   void on_board_gone() { heard_ = false; }
 
   Verdict judge(const Datagram& datagram, Time now);

@@ -12,9 +12,9 @@
 // not refuse is in control. Only served hosts get states, and their datagrams pass at once. Other
 // hosts share a budget (bridged_pair.hpp).
 //
-// A served host keeps its place while its heartbeats come. After a silence it is served again at
-// once, unless another served host needed the place. A paper host has no session id, so the board
-// cannot distinguish two paper hosts behind one bridge. Only one paper host passes at a time.
+// A served host keeps its place while its heartbeats arrive. If no other served host needed the
+// place, the host is served again at once after a silence. A paper host has no session id, so the
+// board cannot distinguish two paper hosts behind one bridge. Only one paper host passes at a time.
 #pragma once
 
 #include <array>
@@ -55,7 +55,7 @@ class BridgeHosts {
   bool is_served_at(Peer peer) const;
   // True if a heartbeat of this host passed at most a timeout ago.
   bool knows(Peer from, SessionId sid, Time now) const;
-  // True if this host is served, or was before a silence. Its datagrams pass at once on every path.
+  // True if this host is served, or was before a silence: it then passes at once, on every path.
   bool trusts(Peer from, SessionId sid, Time now) const;
   bool serves(SessionId sid, Time now) const;
   // The number of this host's first heartbeat that passed since the last silence.

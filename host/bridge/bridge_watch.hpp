@@ -40,7 +40,7 @@ class BridgeWatch {
     return write_lease(writer, "0");
   }
 
-  // True if the refusal answers a W of this bridge. Such a W names no session.
+  // True if the refusal answers a W of this bridge. A W of a bridge names no session.
   bool on_refusal(const Nack& nack, SteadyTime now) {
     if (nack.sid != no_session || next_pnum_ - 1 - nack.pnum >= remembered) return false;
     if (nack.lease == 0) wish_nothing();  // the board rejects the wish

@@ -181,7 +181,7 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
     ++hosts_.counters.refused;
     return answer(datagram, Refusal::auth, 0, from, now, known_.first_heartbeat(from, sid));
   }
-  // Without SID, the answer to Q:ID may be for a paper host or for a program that only asks.
+  // Without SID, the answer to Q:ID may be for a paper host or for a program without a session.
   pass_on(datagram, from, trusted && !(asks_who && sid == no_session), now);
 }
 
@@ -193,7 +193,7 @@ bool BridgedPair::may_ask(Time now) {
 
 // True if the board begins or feeds a session by this heartbeat, or answers BUSY. The heartbeat of
 // a session must echo a heartbeat of the board. BUSY needs a packet number, so the board cannot
-// refuse a paper host without numbers. Such a host is served only if no other host is served.
+// refuse a paper host without numbers. While another host is served, such a host is not served.
 bool BridgedPair::is_judged(const Datagram& heartbeat) const {
   if (heartbeat.session_id() == no_session) return heartbeat.has_pnum() || known_.served().empty();
   const auto board_t = static_cast<std::uint32_t>(board_t_);
@@ -213,7 +213,7 @@ void BridgedPair::follow_hosts(Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   const Text farewell = watch_.write_end(writer);
-  // A served host gets states without a lease. Other programs of a shared transport may need one.
+  // A served host gets states without a lease. Programs that share the transport may need a lease.
   if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 

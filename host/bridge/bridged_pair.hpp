@@ -16,8 +16,8 @@
 // board accepts only from its own cable (site_settings.hpp) never pass. Otherwise every host of the
 // bridge could change them, and the bridge would carry keys and passwords over a network.
 //
-// A bridge sends no heartbeat of its own. It answers BUSY to a host that is kept out, and AUTH to a
-// datagram that must not pass. It answers LEASE to a watcher, because all watchers of a bridge are
+// A bridge sends no heartbeat of its own. The bridge answers BUSY to a host that is kept out, and
+// AUTH to a datagram that must not pass. A watcher gets LEASE, because all watchers of a bridge are
 // one peer to the board. While no host is served, the bridge watches the board (bridge_watch.hpp).
 #pragma once
 
@@ -74,7 +74,7 @@ class BridgedPair {
   // Throws Error for a permanent fault.
   void open();
   void close() noexcept;
-  // Call it every WaitingTime::tick_interval.
+  // Call tick() every WaitingTime::tick_interval.
   void tick();
   BridgeStatus status() const;
 
@@ -92,7 +92,7 @@ class BridgedPair {
     const std::unique_ptr<Carrier> carrier;
     BoardEnd& end;
     bool opened = false;
-    std::string obstacle;  // why it could not be opened, as reported last
+    std::string obstacle;  // why this side could not be opened, as reported last
     Time tried;
     WaitingTime waiting;
     BridgeCounters counters;

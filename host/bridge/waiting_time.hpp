@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The longest time that a datagram may have waited to be read. The datagram came after the input
-// was last empty: when the carrier reported so, or at the previous tick. All input that waits at
+// The longest time that a datagram may have waited to be read. The datagram arrived after the input
+// was last empty: when the carrier reported that, or at the previous tick. All input that waits at
 // one tick is read before the next tick. A process without processor time (Ctrl-Z) misses ticks.
 #pragma once
 

@@ -39,7 +39,6 @@ const ValueWords& words_of(CommandValue value) {
   return value_words[static_cast<std::size_t>(value)];
 }
 
-// "O:pwm,dir,ch"
 std::string form_of(CommandKind kind) {
   const CommandRow& row = row_of(kind);
   std::string form{row.letter, ':'};
@@ -52,7 +51,6 @@ std::string form_of(CommandKind kind) {
   return form;
 }
 
-// "pwm 0-4095, dir 0 or 1, ch 1-4"
 std::string ranges_of(CommandKind kind) {
   const CommandRow& row = row_of(kind);
   std::string ranges;

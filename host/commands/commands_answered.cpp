@@ -8,7 +8,7 @@ namespace r4 {
 
 namespace {
 
-// For boards without CMD. Never true without a state field (threshold, fields, settings).
+// Proof for boards without CMD. False without a state field (threshold, fields, settings).
 bool state_shows(const State& state, const Command& command) {
   if (command.kind == CommandKind::relay) {
     return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of a session from the call to the end. They are sent when the session has control,
-// and repeated until the board's answer or state proves the end. Without I/O.
+// The commands of a session from the call to the end. Commands are sent when the session has
+// control, and repeated until the board's answer or state proves the end. Without I/O.
 //     queued --control--> sent --CMD == PNum in the board's state--> confirmed
 //                          |  ^                  N:…,<code>  ------> refused
 //                          +--+ the same bytes   deadline    ------> timed out
@@ -8,15 +8,15 @@
 //
 // A retry has the bytes and the packet number of the original, and a new signature if there is a
 // key. So the board executes the command only once. When CMD has passed a command, the retry's
-// answer decides: DUPLICATE is executed, STALE is not executed. A refusal proves that the command
-// was not executed only if it names a session that began before the command: the board forgets
-// executed commands over an outage. With a key, AUTH proves only that one duplicate was refused. A
-// board without CMD (the paper's release) confirms a command by the value in its state.
+// answer decides: DUPLICATE proves that the command was executed, STALE that it was not. Only a
+// refusal with a session that began before the command proves that the command was not executed.
+// The board forgets executed commands over an outage. With a key, AUTH proves only that one
+// duplicate was refused. Without CMD (the paper's release), the value in a state is the proof.
 //
 // If the board executes groups (../link/group_support.hpp), a group is one datagram and one pending
 // command. Otherwise its commands are sent one after the other, and later commands wait.
 //
-// E:STOP does not wait for the link. It is repeated every 20 ms until a heartbeat reports the
+// E:STOP does not wait for the link. E:STOP is repeated every 20 ms until a heartbeat reports the
 // reason `stop` and the number of this stop. Then it is repeated for stop_linger, because an
 // E:CLEAR of another program may arrive. E:CLEAR names the cause that was known at the call, and is
 // given up when the board reports a newer cause.
@@ -53,7 +53,7 @@ class CommandsUnderWay {
                    Outbox& outbox, HeardBoard& board, const ArmRequests& arming, CommandEnds& ends,
                    Statistics& counts);
 
-  // --- calls of the program. Each returns 0 if there is no room.
+  // --- calls of the program. If there is no room, each call returns 0.
 
   // A stop is sent even without room. The caller first ends all other commands under way.
   Ticket send(const Command& command, Time timeout, Time now);

@@ -21,8 +21,8 @@ namespace r4 {
 //                          |                           |
 //                          +-------DUPLICATE-----------+--> executed
 //
-// A command may end in any of these states. It is confirmed when CMD names it, or when CMD has
-// passed it and it was executed. A confirmed stop is repeated for stop_linger:
+// A command may end in any of these states. A command is confirmed when CMD names it, or when CMD
+// has passed it and it was executed. A confirmed stop is repeated for stop_linger:
 //     sent --the board reports it--> lingering --the time is over, another stop, an E:CLEAR--> free
 //
 // A group that is sent one by one passes through these states once for each command.
@@ -31,7 +31,7 @@ struct PendingCommand {
     free,
     queued,
     sent,       // and repeated
-    overtaken,  // CMD has passed it: the answer to a retry decides
+    overtaken,  // CMD has passed the command: the answer to a retry decides
     executed,   // the board answered DUPLICATE
     lingering,  // a confirmed stop, which is repeated
   };
@@ -41,7 +41,7 @@ struct PendingCommand {
   bool is_step = false;     // sent by arm(), not by the program
   std::uint32_t pnum = 0;
   std::uint64_t ticket = 0;
-  std::int32_t cause = Command::unnamed_cause;  // clear: the cause that it names
+  std::int32_t cause = Command::unnamed_cause;  // clear: the named cause
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
   std::size_t size = 0;  // of the fields in `bytes`: the command; if sent, also PNum and T
   Command command;       // without texts; of a group, the first command or the command under way

@@ -6,7 +6,6 @@
 
 namespace r4::commissioning {
 
-// `channel`: from 1.
 using CheckFunction = void(Checking&, int channel);
 CheckFunction* function_of(const Check& check);
 

@@ -48,7 +48,7 @@ void check_transports(Checking& c, int) {
   }
 }
 
-// On a lost link the board goes safe and ends its states: the last state gives the time.
+// On a lost link the board goes safe and ends its states, so the last state gives the time.
 void check_silence(Checking& c, int) {
   constexpr Duration longest = 1500ms;  // the default timeout plus a margin
   constexpr std::int32_t expected_ms = 1030;

@@ -33,7 +33,7 @@ struct EncoderTravel {
 };
 
 // Moves in reverse first. A driver may have an input for each direction, while the wiring has pwm
-// and direction. A slow forward command would drive it at nearly full speed in reverse.
+// and direction. A slow forward command would drive the motor at nearly full speed in reverse.
 void check_motor(Checking& c, Thing commanded, MakeCommand make) {
   const Pwm low = Duty(0.1).pwm();
   // Rests in reverse, as in the safe state. Forward may be a high line, which would drive a driver

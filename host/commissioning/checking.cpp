@@ -19,8 +19,8 @@ constexpr Duration longest_gap = 200ms;  // without a state or an answer during 
 constexpr int most_tries = 3;
 constexpr std::string_view supply = "motor supply";
 
-// Stops the board unless the movement was ended in order. No heartbeat is sent before the board has
-// confirmed the stop: with recovery=last a heartbeat would restore the outputs.
+// Unless the movement was ended in order, stops the board. No heartbeat is sent before the board
+// has confirmed the stop: with recovery=last a heartbeat would restore the outputs.
 class StopUnlessEnded {
  public:
   explicit StopUnlessEnded(BoardUnderTest& board) : board_(board) { board.supervise(true); }

@@ -33,7 +33,7 @@ class Checking {
 
   void say(std::string_view text) { person_.say(check.id, text); }
   bool confirms(Topic topic, std::string text);
-  // Gives up unless the person confirms. `otherwise`: the note.
+  // Unless the person confirms, ends the check with the note `otherwise`.
   void require(Topic topic, std::string text, const char* otherwise);
   double number(Topic topic, std::string text, std::string unit);
   // The thing that moved or clicked; no value if nothing did. Gives up if nothing is connected.
@@ -57,7 +57,7 @@ class Checking {
   void hold(const Movement& movement, const std::optional<Command>& rest,
             const std::function<void()>& act);
   // Waits for the next state while something moves. False if the person released the key, or the
-  // board went safe. Throws Error if no state comes.
+  // board went safe. Throws Error if no state arrives.
   bool watch(ReceivedState& state);
 
   void measured(std::string what, double value, std::string unit);

@@ -54,7 +54,7 @@ void identify(BoardUnderTest& board, Report& report) {
   }
   try {
     take_wiring(board.wiring(), report);
-  } catch (const Error& error) {  // the board reports it only on its own cable
+  } catch (const Error& error) {  // the board reports the wiring only on its own cable
     if (error.kind() != ErrorKind::refused) throw;
   }
 }

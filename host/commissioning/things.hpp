@@ -17,7 +17,6 @@ struct Thing {
   int signal() const { return signal_index(first, channel); }
   friend bool operator==(const Thing&, const Thing&) = default;
 };
-// Such as "osmc 1".
 std::string name_of(Thing thing);
 // The thing of a signal. `signal`: an index in Wiring.
 Thing thing_of(int signal);

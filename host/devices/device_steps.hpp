@@ -44,7 +44,7 @@ std::chrono::milliseconds longest(const Device& device, std::chrono::millisecond
 std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step,
                                     const I2cAnswer& answer);
 
-// The chosen fields (as in F) plus the device's fields. Empty: `chosen` is empty or has them all.
+// The chosen fields (as in F) plus the device's fields. Empty: `chosen` is empty or has all.
 std::string fields_with(const std::string& chosen, const Device& device);
 
 }  // namespace r4

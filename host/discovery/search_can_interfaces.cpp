@@ -73,7 +73,7 @@ class NodeQuestion final : private Carrier::Handler {
       if (!error) ask();
     });
   }
-  void on_datagram(std::string_view, Peer) override {}  // the listener of the bus receives it too
+  void on_datagram(std::string_view, Peer) override {}  // the bus listener receives datagrams
   void on_carrier_event(const CarrierEvent&) override {}
 
   FoundBoard& board_;

@@ -14,9 +14,9 @@ namespace r4 {
 constexpr std::chrono::milliseconds between_questions{150};
 constexpr int most_questions = 3;
 
-// Asks ports with a board's USB id, and the ports `besides` with any USB id. Takes at most 1.3 s.
+// Sends Q:ID to ports with a board's USB id, and to `besides` with any USB id, in at most 1.3 s.
 Discovery search_serial_ports(const std::vector<std::string>& besides);
-// Takes 0.7 s, or 1.3 s if a board that was heard does not answer.
+// Takes 0.7 s. If a board sends datagrams but no answer: 1.3 s.
 Discovery search_can_interfaces();
 Discovery search_networks(std::uint16_t port);  // takes 0.5 s
 

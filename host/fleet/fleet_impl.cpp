@@ -12,7 +12,7 @@ namespace r4 {
 
 namespace {
 
-// Each datagram would wake the thread. In a busy window it pauses first, and then takes several.
+// Each datagram would wake the thread, so in a busy window the thread waits and takes several.
 constexpr std::chrono::milliseconds window{10};
 constexpr std::size_t busy_window = 200;
 constexpr std::chrono::microseconds breather{200};

@@ -10,7 +10,7 @@
 //     satisfied  the states have CMD, and this host is in control
 //     asking     F is sent every 200 ms. An executed F proves that the board obeys this host
 //     unheard    the board counts as a board of the paper's release, which does not know F. F is
-//                sent once a second, because a bad path may have lost all five
+//                sent once a second, because a bad path may have lost all five F
 #pragma once
 
 #include <cstdint>

@@ -36,7 +36,7 @@ class GroupSupport {
     state_ = State::unknown;
     unanswered_ = 0;
   }
-  // True if Q:ID is due. Call it while a group waits. `answers`: the board has ever sent an answer.
+  // True if Q:ID is due. Call ask() while a group waits. `answers`: the board has ever answered.
   bool ask(bool answers, Time now) {
     if (state_ != State::unknown || now < next_) return false;
     next_ = now + retry;

@@ -8,8 +8,8 @@ namespace r4 {
 namespace {
 
 // Estimating the board's clock needs more questions than identify_interval gives: first until the
-// error is small, later whenever it has grown. The interval is not a whole number of milliseconds,
-// so the answers also show where a millisecond of the board's clock begins.
+// error is small, later whenever the error has grown. The interval is not a whole number of
+// milliseconds, so the answers also show where a millisecond of the board's clock begins.
 constexpr Time soon_interval{102'300};
 constexpr Time first_goal{500}, later_goal{1'000};
 constexpr int first_questions = 100, questions_in_vain = 10;

@@ -79,7 +79,7 @@ void LinkKeeper::send_lease(Time now) {
 
 void LinkKeeper::send_heartbeat(Time now) {
   if (!link_.heartbeat_due(to_ms(now))) return;
-  link_.heartbeat_sent(to_ms(now));  // on_sent() undoes this if no path takes the heartbeat
+  link_.heartbeat_sent(to_ms(now));  // if no path sends it, on_sent() undoes this
   heartbeat_.begin(outbox_.send(Command::heartbeat(), {.echo = link_.echo()}, now));
   if (heartbeat_.failed()) link_.heartbeat_not_sent(to_ms(now));
 }

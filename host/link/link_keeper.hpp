@@ -47,7 +47,7 @@ class LinkKeeper {
   void begin_anew();
   void hold(bool held);
 
-  // Call it before the functions below: applies changes of the link to the role.
+  // Call update() before the functions below: update() applies changes of the link to the role.
   void update() { role_.on_link(is_up()); }
   // True if the board receives this host's heartbeats.
   bool is_up() const;

@@ -39,8 +39,8 @@ class Outbox {
 
   Sent send(const Command& command, Way way, Time now);
   Sent send(const Setpoints& group, Time now);
-  // Sends a stamped command. A stop is sent on every path. Other commands are sent on paths to the
-  // session's board, unless the host has a key and the board has none.
+  // Sends a stamped command. A stop is sent on every path. If the host has a key and the board has
+  // no key, only stops are sent. Otherwise all commands are sent on paths to the session's board.
   PathSet send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, Way way, Time now);
 
   // Writes SID, PNum and, in a datagram with an echo, T.

@@ -8,9 +8,9 @@
 // is possible. The tightest limits of each second are kept for the last minute. So the memory is
 // constant, and the estimate follows a drift that changes with the temperature.
 //
-// The estimate is the middle of the remaining range. It is exact if the fastest datagrams take
-// equally long in both directions. Without answers (a watcher may not be able to ask) the estimate
-// is the upper limit, and its error is unknown.
+// The estimate is the middle of the remaining range. If the fastest datagrams take equally long in
+// both directions, the estimate is exact. Without answers (a watcher may not be able to ask) the
+// estimate is the upper limit, and its error is unknown.
 #pragma once
 
 #include <array>
@@ -36,7 +36,7 @@ class BoardClock {
     Time at;
     std::optional<Time> error;  // largest error of `at`; no value: unknown
   };
-  // When the board's clock began to show t_ms. Call it only after heard() or answered().
+  // When the board's clock began to show t_ms. Call at() only after heard() or answered().
   Instant at(std::uint32_t t_ms) const;
 
   // How much slower the board's clock runs than the host's clock, and the error of this drift; ppm.
@@ -58,7 +58,7 @@ class BoardClock {
   // The lower side negates each offset, so one algorithm serves both sides.
   struct Side {
     std::array<Limit, seconds> limits;
-    // The tightest limit at present. The drift loosens it with time.
+    // The tightest limit at present. The drift loosens the limit with time.
     Limit front{none, 0, std::numeric_limits<double>::infinity()};
   };
 

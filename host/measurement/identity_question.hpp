@@ -5,8 +5,8 @@
 //                      +-- eight newer ones --> forgotten
 //
 // An answer names its question (ASKED). Without ASKED the round trip counts from the newest
-// question, and the answer closes all questions. Such an answer may belong to an older question, so
-// it does not limit the board's clock (board_clock.hpp).
+// question, and the answer closes all questions. An answer without ASKED may belong to an older
+// question, so it does not limit the board's clock (board_clock.hpp).
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ class IdentityQuestion {
     if (std::any_of(open_.begin(), open_.end(), same)) return;
     open_[count_++ % open_.size()] = {pnum, now, true};
   }
-  // Returns when the answered question was first sent; no value if it is not open.
+  // Returns when the answered question was first sent. If the question is not open: no value.
   std::optional<Time> answered(const Identity& identity) {
     for (std::size_t i = 1; i <= open_.size(); ++i) {
       Asked& asked = open_[(count_ - i) % open_.size()];

@@ -7,8 +7,8 @@
 //         +----------- BUSY: full; refused otherwise: unknown -----------+
 //
 //     asking    W is sent every 500 ms; at once with a LEASE to echo, or when a transport comes up
-//     watching  as `asking`: a lease lasts 2 s. After 1 s without a state, a refusal has the
-//               same effect as in `asking`
+//     watching  W is sent as in `asking`, because a lease lasts 2 s. After 1 s without a state, a
+//               refusal has the same effect as in `asking`
 //     full      the board has no room for another watcher; W is sent once a second
 //     unknown   the board does not support watchers; W is sent once a second, because another board
 //               may replace it
@@ -44,7 +44,7 @@ class Lease {
     if (nack.lease != 0) {
       echo_ = nack.lease;
       renew(now);
-    } else if (!streaming(now)) {  // otherwise the states come for the controlling host
+    } else if (!streaming(now)) {  // otherwise the states are for the controlling host
       state_ = nack.code == Refusal::busy ? State::full : State::unknown;
     }
   }

@@ -48,8 +48,8 @@ class PathClock {
 
 struct PathQuestions {
   IdentityQuestion open;
-  bool answered = false;  // since the transport came up
-  bool in_doubt = false;  // a T that does not fit came after the newest question
+  bool answered = false;  // since the transport went up
+  bool in_doubt = false;  // a T that does not fit arrived after the newest question
   int unanswered = 0;     // questions in doubt since the last answer
   Time asked_at{0};
   Time ask_at{0};

@@ -23,7 +23,7 @@ class PathNews {
   // --- the packet number of each admitted datagram, before the functions below
 
   void on_number(std::size_t index, std::uint32_t pnum);
-  // An answer is always new. It is counted only after the first state or heartbeat.
+  // An answer is always new, but counted only after the first state or heartbeat.
   void on_answer(std::size_t index, std::uint32_t pnum);
   // The next number will be unrelated to the last number.
   void restart(std::size_t index);
@@ -57,11 +57,11 @@ class PathNews {
     std::uint32_t pnum = 0;  // of the datagram in process
     Arrival arrival = Arrival::first;
     std::uint32_t gap = 0;     // missing numbers before this datagram
-    std::uint32_t others = 0;  // datagrams that came first on other paths, since this path's newest
+    std::uint32_t others = 0;  // datagrams first received on other paths, since this path's newest
     std::uint32_t lost = 0;    // lost datagrams in this path's gaps
     std::uint64_t copies = 0;
   };
-  // The newest datagram of a kind, and the path on which it came first.
+  // The newest datagram of a kind, and the path on which it arrived first.
   struct First {
     std::uint32_t t_ms = 0;
     std::uint32_t pnum = 0;

@@ -77,7 +77,7 @@ void Paths::asked(std::size_t index, std::uint32_t pnum, bool sent, Time now) {
   questions.in_doubt = false;
 }
 
-// At most ten times a second.
+// Q:ID is sent at most ten times a second.
 void Paths::ask_soon(Path& path, Time now) {
   if (!path.can_ask) return;
   PathQuestions& questions = path.questions;
@@ -257,7 +257,7 @@ bool Paths::admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_
       if (path.known) ask_soon(path, now);
       return false;
     }
-    // On a bus, the answer to a lease comes before the first state.
+    // On a bus, the answer to a lease precedes the first state.
     if (!path.known || path.clock.known()) return false;
     if (!fits(path, t_ms, now)) {
       if (!anew_) turn_away(path);

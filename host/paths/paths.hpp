@@ -13,14 +13,14 @@
 // path, and a bus on which this program must not send Q:ID, skip `asking`.
 //
 // Before its board has answered, a path carries only Q:ID and stops, and its datagrams are dropped.
-// The first board that answers is the session's board, unless all other paths lead to another. The
+// Unless all other paths lead to another board, the first board that answers is the session's. The
 // session begins when all paths that are up have answered, or 300 ms after the first answer.
 //
 // Packet numbers differ between paths, so the board's time T decides which datagram is newest. Each
 // path has its own estimate of the board's clock. If a datagram's T does not fit, the datagram is
-// late, or the board has restarted: the datagram is dropped, and Q:ID is sent. The answer proves a
-// restart if its T does not fit either, and if the question was sent after the newest answer of the
-// known boot. A board that does not answer Q:ID (the paper's release) is trusted without an answer.
+// late, or the board has restarted: the datagram is dropped, and Q:ID is sent. If the T of the
+// answer does not fit either, and the question was sent after the newest answer of the known boot,
+// the answer proves a restart. A board without Q:ID (the paper's release) is trusted.
 #pragma once
 
 #include <cstddef>
@@ -164,7 +164,7 @@ class Paths {
   const HostLink& link_;
   std::optional<std::string> id_;  // of the session's board
   bool begun_ = false;
-  bool anew_ = true;  // no datagram has come since all paths were down
+  bool anew_ = true;  // no datagram has arrived since all paths were down
   Time first_answer_{0};
   std::uint32_t boot_ = 0;
   Time proven_{0};   // the time of the last proof of the boot

@@ -38,7 +38,7 @@ class Recorder {
   void name_path(std::uint16_t path, std::string name);
   void add_device(RecordedDevice device);
   // Copies `bytes`, at most max_record_bytes, without allocating. `at`: by the steady clock.
-  // Records are written in order of time if each arrives at most `settled` after its time.
+  // If each record arrives at most `settled` after its time, records are written in order of time.
   void record(std::uint16_t path, RecordKind kind, std::string_view bytes, Time at);
   void record(std::uint16_t path, RecordKind kind, std::string_view bytes) {
     record(path, kind, bytes, steady_now());

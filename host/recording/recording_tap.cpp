@@ -52,7 +52,7 @@ void RecordingTap::on_packets(const PacketCounters& packets) {
   if (recorder_ && packets.lost > lost_) {
     record(RecordKind::event, fmt::format("lost {}", packets.lost - lost_));
   }
-  lost_ = packets.lost;  // decreases when a late datagram comes
+  lost_ = packets.lost;  // decreases when a late datagram arrives
 }
 
 void RecordingTap::on_name(std::string_view name) {

@@ -22,7 +22,7 @@ class RecordingTap {
   // Returns, once, why the recording has ended or was restarted. Detaches an ended recording.
   std::optional<Problem> take_news();
 
-  // `at`: when the datagram came, by the steady clock.
+  // `at`: when the datagram arrived, by the steady clock.
   void on_received(std::string_view bytes, Time at) {
     if (recorder_) recorder_->record(path_, RecordKind::from_board, bytes, at);
   }

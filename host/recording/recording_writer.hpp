@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes records to files: compressed for names in .zst, several files if there are limits. Blocks
-// while the disk is slow. Has no clock, and uses the records' times.
+// Writes records to files. Files with names in .zst are compressed. With limits there are several
+// files. Blocks while the disk is slow. Has no clock, and uses the records' times.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ class RecordingWriter {
   void close();  // as flush(), and ends the compressed frame
 
   const std::string& path() const { return path_; }
-  // Why the file was restarted since the last call, if it was. Kind `data`: the content is lost.
+  // If the file was restarted since the last call: why. Kind `data`: the content is lost.
   std::optional<Problem> take_trouble() { return std::exchange(trouble_, std::nullopt); }
 
  private:

@@ -13,7 +13,7 @@ namespace {
 // First bytes of a frame (RFC 8878, 3.1.1).
 constexpr std::string_view magic = "\x28\xb5\x2f\xfd";
 // Last three bytes of a skippable frame's magic number; the first is 0x50 to 0x5F (RFC 8878,
-// 3.1.2). Files of pzstd and seekable archives start with one.
+// 3.1.2). Files of pzstd and seekable archives start with such a frame.
 constexpr std::string_view skippable = "\x2a\x4d\x18";
 // The largest window to read: 128 MiB, as `zstd -d` without options. A small frame takes less.
 constexpr int window_log = 27;

@@ -4,8 +4,8 @@
 //     path    number of the path in the recording
 //     from    seconds of the recording to skip, or a UTC time: 2026-11-23T21:20:00
 //
-// Replays the board's datagrams, also damaged ones, and its transport's ups and downs. Drops sent
-// datagrams. After the end the transport stays down. Reads on the loop, 16 KiB at a time.
+// Replays the board's datagrams, also damaged datagrams, and its transport's `up` and `down`. Drops
+// sent datagrams. After the end the transport stays down. Reads on the loop, 16 KiB at a time.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -34,7 +34,7 @@ class ReplayRecords final : private RecordingVisitor {
   ReplayRecords(const std::string& thing, const std::string& file, std::uint16_t path,
                 const ReplayStart& start);
 
-  // The next item, which take() removes; null if it was not read yet.
+  // The next item, which take() removes; null if no item was read yet.
   const Item* next() const { return waiting_.empty() ? nullptr : &waiting_.front(); }
   Item take();
   // Reads at most 16 KiB more. False if the file has ended and no item waits. Throws Error.

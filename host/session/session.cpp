@@ -161,7 +161,7 @@ Ticket Session::send(const Command& command, Time timeout, Time now) {
   require_valid(command);
   require_control(board_role(), command);
   if (command.kind == CommandKind::stop) {
-    // A command from before the stop must not follow it.
+    // A command from before the stop must not follow the stop.
     end_all_but_stops(Outcome::cancelled, now);
     arming_.disarm(DisarmCause::stop);
   }
@@ -215,7 +215,7 @@ void Session::cancel(Ticket ticket, Time now) {
   advance_arming(now);
 }
 
-// May be tried without the capability: a board that confirms commands refuses an unknown farewell.
+// Needs no capability, because a board that confirms commands refuses an unknown farewell.
 bool Session::may_say_farewell() const {
   return keeper_.is_up() && !watches() && board_.may_know_leave();
 }

@@ -70,18 +70,18 @@ class Session {
   // --- commands. CommandEnded reports the end, at most `timeout` after `now`.
 
   // Throws Error{usage} for a command outside its ranges. Returns 0 if 64 commands are under way.
-  // Command::identify(): the answer confirms it, and BoardIdentified follows. Command::stop():
-  // cancels all other commands, and is confirmed when the board reports this stop's number. If 16
-  // stops are under way, returns 0 but sends the stop.
+  // Command::identify(): the answer confirms the command, and BoardIdentified follows.
+  // Command::stop(): cancels all other commands, and is confirmed when the board reports this
+  // stop's number. If 16 stops are under way, returns 0 but sends the stop.
   Ticket send(const Command& command, Time timeout, Time now);
-  // Executed together, or one by one without groups. Throws Error{usage} for an empty group.
+  // Commands run together or, without groups, singly. Throws Error{usage} for an empty group.
   Ticket send(const Setpoints& group, Time timeout, Time now);
   // Clears the cause of the safe state, if possible, and closes relay 1, the motor supply. The
-  // board's state confirms it. Later output commands wait for the end of arm().
+  // board's state confirms the arming. Later output commands wait for the end of arm().
   Ticket arm(Time timeout, Time now);
   // Ends heartbeats and all commands except stops, and sends the farewell: the outputs are safe at
-  // once, and another host need not wait for the timeout. The board's report confirms it. Returns 0
-  // without a link, or if the board does not support the farewell. Afterwards only stops are sent.
+  // once, and another host need not wait for the timeout. The board's report confirms the farewell.
+  // Returns 0 without a link, or if the board lacks the farewell. Then only stops are sent.
   Ticket leave(Time timeout, Time now);
   bool leaving() const { return keeper_.is_leaving(); }
   // As leave(), but the commands end as cancelled, and change_role() may follow.
@@ -95,7 +95,7 @@ class Session {
 
   // PostRefused reports a refusal. After `sent`, perform the effects, then call posted().
   PostResult post(const Command& command, Time now);
-  // Also no_link until the board has reported whether it executes groups.
+  // Until the board has reported whether it executes groups, also returns no_link.
   PostResult post(const Setpoints& group, Time now);
   PostResult posted();
   // True if the board executes no groups: post a group's commands one after the other.
@@ -104,7 +104,7 @@ class Session {
   // The application watchdog: without feed() for `period`, heartbeats and commands stop. 0: off.
   void watchdog(std::chrono::milliseconds period, Time now);
   void feed(Time now);
-  // True: holds back heartbeats and commands. False: resumes them.
+  // True: holds back heartbeats and commands. False: resumes both.
   void hold(bool held, Time now);
 
   BoardRole board_role() const { return outbox_.role(); }

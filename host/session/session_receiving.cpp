@@ -133,7 +133,7 @@ void Session::on_identity(std::size_t path, const Datagram& datagram, Time now) 
   commands_.on_identity(identity, now);
 }
 
-// True if it is numbered with the states. Answers to hosts without control have separate numbers.
+// True if the answer is numbered with the states. Hosts without control get separate numbers.
 bool Session::counts(const Identity& identity) const {
   const bool to_watcher = watches() && identity.sid == no_session;
   return to_watcher || !(identity.has_busy && identity.busy);

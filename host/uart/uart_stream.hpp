@@ -15,7 +15,7 @@ class UartStream {
  public:
   static constexpr std::size_t capacity = std::size_t{64} * 1024;
 
-  // Call it when the board has restarted, because the board then counts from 0.
+  // Call restart() when the board has restarted, because the board then counts from 0.
   void restart() { begun_ = false; }
 
   // Appends new bytes and losses to each of `outs`. True if it appended any.

@@ -60,8 +60,8 @@ class AsyncBoard {
   AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), url, std::move(options)) {}
-  // Over one to four paths to the same board (docs/how-to/redundancy.md). Throws Error{usage} also
-  // for a duplicate URL, and for sim: and replay:, which are separate boards.
+  // A board over one to four paths (docs/how-to/redundancy.md). Throws Error{usage} also for a
+  // duplicate URL, and for sim: and replay:, which are separate boards.
   AsyncBoard(const executor_type& executor, const std::vector<std::string>& urls,
              BoardOptions options = {});
   AsyncBoard(asio::io_context& io, const std::vector<std::string>& urls, BoardOptions options = {})
@@ -70,7 +70,7 @@ class AsyncBoard {
              BoardOptions options = {})
       : AsyncBoard(io.get_executor(), std::vector<std::string>(urls.begin(), urls.end()),
                    std::move(options)) {}
-  // On a transport of your own, not yet open.
+  // A board on a transport of your own, not yet open.
   AsyncBoard(const executor_type& executor, std::unique_ptr<Carrier> carrier,
              BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::unique_ptr<Carrier> carrier, BoardOptions options = {})
@@ -92,10 +92,10 @@ class AsyncBoard {
   // Ends commands under way (outcome closed), sends one farewell and closes the transports. The
   // board goes safe at the farewell, or after its timeout. No callback follows. Idempotent.
   void close();
-  // void(CommandResult). As close(), but repeats the farewell until the board answers: then the
-  // board is free for another host. Confirmed: the outputs are safe, and no host controls the
-  // board. Closed: this program did not control the board, or the board does not support the
-  // farewell. No callback follows; a stop continues.
+  // void(CommandResult). As close(), but repeats the farewell until the board answers. The board is
+  // then free for another host. Confirmed: the outputs are safe, and no host controls the board.
+  // Closed: this program did not control the board, or the board does not support the farewell. No
+  // callback follows; a stop continues.
   template <class Token>
   auto async_close(Duration timeout, Token&& token) {
     require_timeout("async_close()", timeout);
@@ -108,8 +108,8 @@ class AsyncBoard {
   void take_control();
   // void(CommandResult). Disarms, cancels all commands except stops, and sends the farewell as
   // async_close() does. The program is always a watcher afterwards. Confirmed: the board is safe
-  // and free, or the program was a watcher. Refused: another host controlled the board. Timed out,
-  // and none (no link, or a board without farewells): the board goes safe after its timeout.
+  // and free, or the program was a watcher. Refused: another host controlled the board. Timed out:
+  // the board goes safe after its timeout. None (no link, or a board without farewells): likewise.
   template <class Token>
   auto async_release_control(Duration timeout, Token&& token) {
     require_timeout("async_release_control()", timeout);
@@ -122,9 +122,9 @@ class AsyncBoard {
   void require_sendable(const Setpoints& setpoints) const;
 
   // void(CommandResult). Throws as require_sendable(), and for a timeout that is not above 0. A
-  // stop overtakes and cancels all commands, also before the link is up. Watchers may send it too,
-  // and its timeout may be 0. The board's answer confirms Command::identify(), and identity()
-  // returns it. Command::clear() clears the stop, watchdog or fault that the board reports.
+  // stop overtakes and cancels all commands, also before the link is up. Watchers may send a stop,
+  // whose timeout may be 0. The board's answer confirms Command::identify(), and identity() returns
+  // the answer. Command::clear() clears the reported stop, watchdog or fault.
   template <class Token>
   auto async_send(const Command& command, Duration timeout, Token&& token) {
     require_sendable(command);
@@ -148,7 +148,7 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_arm, Token>(token, timeout);
   }
   // void(CommandResult). Sends a Command::i2c_read(), i2c_write() or i2c_scan().
-  // CommandResult::transfer is the device's answer. Refused also if the transfer failed. Throws as
+  // CommandResult::transfer is the device's answer. If the transfer failed: refused. Throws as
   // require_sendable(), and for another command or a timeout that is not above 0.
   template <class Token>
   auto async_transfer(const Command& command, Duration timeout, Token&& token) {
@@ -158,7 +158,7 @@ class AsyncBoard {
   }
 
   // void(CommandResult). Confirmed when the board is ACTIVE and obeys this host; for a watcher,
-  // when the link is active or safe. Refused if the paths lead to two boards. `timeout` may be 0.
+  // when the link is active or safe. If the paths lead to two boards: refused. `timeout` may be 0.
   template <class Token>
   auto async_wait_active(Duration timeout, Token&& token) {
     require_wait("async_wait_active()", timeout);
@@ -189,7 +189,7 @@ class AsyncBoard {
   // Sends once, without confirmation. Returns why a command is not sent. on_refused() reports a
   // refusal of the board. A stop is sent as by async_send(), for 1 s. Throws Error{usage}.
   PostResult post(const Command& command);
-  // For a board without groups, posts the commands one by one, up to the first that is not sent.
+  // For a board without groups, posts the commands one by one, up to the first unsent command.
   PostResult post(const Setpoints& setpoints);
 
   // The newest values; after close(), the last values.
@@ -218,8 +218,8 @@ class AsyncBoard {
   // heartbeats and commands of the controlling host, all stops. Dots replace secrets.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
-  // Called when a path starts or stops carrying: at once if the transport reports that it is down,
-  // otherwise after the timeout of SessionOptions::timing.
+  // Called when a path starts or stops carrying. If the transport reports that it is down, the call
+  // is immediate, otherwise after the timeout of SessionOptions::timing.
   Subscription on_path(std::function<void(const PathStatus&)> callback);
   // Events of the transports, and a warning if a busy event loop delayed heartbeats.
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
@@ -235,7 +235,7 @@ class AsyncBoard {
   // As Board::watchdog(). feed(): any thread; takes effect in the loop's next turn.
   void watchdog(Duration period);
   void feed();
-  // True: holds back heartbeats and commands, so that the board goes safe. False: resumes them.
+  // True: holds back heartbeats and commands, so that the board goes safe. False: resumes both.
   void hold_heartbeats(bool held);
 
  private:

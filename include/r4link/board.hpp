@@ -20,7 +20,7 @@
 // Callbacks run one at a time on a separate thread. A callback may call any function here and may
 // wait: the heartbeats continue. If a callback does not return within BoardOptions::callback_limit,
 // the heartbeats stop and the board goes safe. When the callback has returned, on_event() reports
-// its run time. While a callback runs, a newer state replaces a waiting one; states() has every
+// its run time. While a callback runs, a newer state replaces a waiting state; states() has every
 // state. An exception from a callback ends the program.
 #pragma once
 
@@ -84,7 +84,7 @@ class R4LINK_API States {
   // Waits for the next state. Empty if no state arrives in time, or if the board was closed and the
   // queue is empty. If lossless, throws Error{data} once for each gap.
   std::optional<ReceivedState> take(Duration timeout);
-  // True if the queue is empty and no more states will come.
+  // True if the queue is empty and no more states will arrive.
   bool ended() const;
   std::uint64_t missed() const;
 
@@ -103,23 +103,23 @@ class R4LINK_API Board {
 
   // Opens the transport and starts the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
-  // Over one to four paths to the same board: {"serial:auto", "udp://192.168.0.125"}
+  // Opens a board over one to four paths: {"serial:auto", "udp://192.168.0.125"}
   // (docs/how-to/redundancy.md). '+' joins several URLs in one text. Throws Error{usage} also for a
   // duplicate URL, and for sim: and replay:, which are separate boards. If a path cannot be opened,
-  // on_event() reports it, and the Board retries every second. Throws Error if none can be opened.
+  // on_event() reports it, and the Board retries every second. Throws Error if no path opens.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   Board(std::initializer_list<std::string_view> urls, BoardOptions options = {},
         BoardCallbacks callbacks = {})
       : Board(std::vector<std::string>(urls.begin(), urls.end()), std::move(options),
               std::move(callbacks)) {}
-  // On transports of your own. Throws Error.
+  // Opens a board on transports of your own. Throws Error.
   explicit Board(const CarrierMaker& make, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   explicit Board(const std::vector<CarrierMaker>& makers, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   // Opens the only board that discover() finds (discovery/discover.hpp). Blocks for at most 1.3 s.
-  // Throws Error{open} if it finds no board, and Error{usage} with all URLs for several boards.
+  // Throws Error{open} for no board, and Error{usage} with all URLs for several boards.
   static Board first(BoardOptions options = {}, const DiscoveryOptions& where = {});
   ~Board();
   Board(const Board&) = delete;
@@ -152,7 +152,7 @@ class R4LINK_API Board {
 
   // --- commands: each returns when the board's state confirms it, or throws Error{refused}
 
-  // Command::clear() clears the stop, watchdog or fault that the board reports; moves nothing.
+  // Command::clear() clears the stop, watchdog or fault that the board reports, and moves nothing.
   void send(const Command& command, Duration timeout = default_timeout);
   // Output commands that the board executes in one pass over its chips, or not at all, such as all
   // wheels of a robot. If a command fails, Error::at() is its number, from 1. A board without
@@ -160,19 +160,19 @@ class R4LINK_API Board {
   // commands before the failed command were executed, and the Error reports that. Until the board
   // has reported its capabilities, post() of a group returns no_link.
   void send(const Setpoints& setpoints, Duration timeout = default_timeout);
-  // The same from text: "O:358,1,1"; "O:358,1,1;O:358,1,2" is a group.
+  // Sends a command from text: "O:358,1,1"; "O:358,1,1;O:358,1,2" is a group.
   void send(std::string_view text, Duration timeout = default_timeout);
   // Sends once, without confirmation, for streams of setpoints. If the command is not sent, returns
-  // the reason; queue_full also if 256 commands wait. on_refused() reports commands that the board
-  // refuses. A stop is repeated as by stop_async(). Allocates nothing.
+  // the reason. If 256 commands wait, the reason is queue_full. on_refused() reports commands that
+  // the board refuses. A stop is repeated as by stop_async(). Allocates nothing.
   PostResult post(const Command& command);
   PostResult post(const Setpoints& setpoints);
 
-  // Call it before the first output command (O D S R P B Z), and after every safe state except a
+  // Call arm() before the first output command (O D S R P B Z), and after every safe state except a
   // lost link. Before that, the Board refuses output commands, so that a program drives only on
-  // purpose. Clears a stop, a watchdog or a fault that came while this program controlled the
+  // purpose. Clears a stop, a watchdog or a fault that began while this program controlled the
   // board, then closes relay 1, the motor supply. Throws Error{refused} if the handle is released,
-  // a cause cannot be cleared or a stop comes meanwhile. Also throws Error{refused} for a cause
+  // a cause cannot be cleared or a stop arrives meanwhile. Also throws Error{refused} for a cause
   // that may be older than this program, and for a fault since the board's start. Clear such a
   // cause on purpose with Command::clear(): a restarted program or board must not drive off. Not
   // needed with BoardOptions::session.arming = Arming::off.
@@ -214,12 +214,12 @@ class R4LINK_API Board {
    public:
     void set(Microseconds pulse, Duration timeout = default_timeout) const;  // 0 (off) to 2500
     PostResult post(Microseconds pulse) const;
-    // Call it once before you drive this servo in degrees. The Board object keeps the calibration,
-    // also while the link is lost. It is not sent to the R4 board.
+    // Call calibrate() once before you drive this servo in degrees. The Board object keeps the
+    // calibration, also while the link is lost. The calibration is not sent to the R4 board.
     void calibrate(const ServoCalibration& calibration) const;
     // Throws Error{usage} if the servo was not calibrated.
     ServoCalibration calibration() const;
-    // Both also throw Error{usage} for an angle outside the calibration's range.
+    // set() and post() also throw Error{usage} for an angle outside the calibration's range.
     void set(Degrees angle, Duration timeout = default_timeout) const;
     PostResult post(Degrees angle) const;
 
@@ -276,11 +276,11 @@ class R4LINK_API Board {
   };
 
   // The devices on the user's I2C bus (docs/how-to/devices.md): 7-bit addresses, at most 32 bytes
-  // each way. Calls return the device's answer; without one they throw Error{refused}.
+  // each way. Calls return the device's answer. Without an answer, calls throw Error{refused}.
   class I2c {
    public:
     using Bytes = std::vector<std::uint8_t>;
-    // Reads a register. `register_bytes`: its number, 1 or 2 bytes; {}: reads without a register.
+    // Reads a register. `register_bytes`: the register's number, 1 or 2 bytes; {}: no register.
     Bytes read(int address, const Bytes& register_bytes, int count,
                Duration timeout = default_timeout) const;
     // Writes, then reads `count` bytes. Needs arm(), because the device may move something.
@@ -304,22 +304,22 @@ class R4LINK_API Board {
   I2c i2c() { return I2c(*this); }
   // Sets up a described device (devices/device.hpp, docs/how-to/described-devices.md): checks its
   // identity, writes its registers and starts the board's readings. Writing needs arm(). The
-  // readings last until the session ends. Adds their fields to the selection of fields(). Call
-  // attach() again after on_restart() and after a lost link. `timeout` is for each step. Throws
-  // Error{refused} if the device does not answer or is another device; finished steps are not
-  // undone. Throws Error{usage} if another device has one of the slots: i2c().poll_off() frees it.
+  // readings last until the session ends. Adds the device's fields to fields(). Call attach() again
+  // after on_restart() and after a lost link. `timeout` is for each step. Throws Error{refused} if
+  // the device does not answer or is another device; finished steps are not undone. Throws
+  // Error{usage} if another device has one of the slots: i2c().poll_off() frees it.
   void attach(const Device& device, Duration timeout = default_timeout);
 
   // One of the user's UARTs, 1 or 2 (docs/how-to/devices.md): setting("uart1", "115200:8N1") turns
-  // it on, fields("DEFAULT,UART1") requests its bytes. The Board joins the bytes of successive
-  // states, in order and each byte once. Missing bytes are counted.
+  // the UART on, and fields("DEFAULT,UART1") requests its bytes. The Board joins the bytes of
+  // successive states, in order and each byte once. Missing bytes are counted.
   struct UartData {
     std::vector<std::uint8_t> bytes;
     std::uint64_t lost = 0;  // number of bytes missing before or among `bytes`
   };
   class Uart {
    public:
-    // 1-48 bytes. Confirmed when the board has accepted all. Needs arm(): the device may move.
+    // 1-48 bytes. Confirmed when the board has accepted all bytes. Needs arm(): devices may move.
     void write(const std::vector<std::uint8_t>& bytes, Duration timeout = default_timeout) const;
     // The bytes since the last read(), at most 64 KB; older bytes count as lost. Waits for the
     // first byte. Empty if no byte arrives in time.
@@ -355,10 +355,10 @@ class R4LINK_API Board {
   void link_timing(Duration board_timeout, Duration heartbeat, Duration timeout = default_timeout);
 
   BoardIdentity identify(Duration timeout = default_timeout);
-  // The wiring that the board keeps (docs/reference/wiring.md). Only over the board's own cable.
+  // The wiring that the board keeps (docs/reference/wiring.md). Needs the board's own cable.
   BoardWiring wiring(Duration timeout = default_timeout);
   // Checks `wiring` and sends it to the board, which uses it from its next start. Throws
-  // Error{data} for a wiring with a fault. Only over the board's own cable.
+  // Error{data} for a wiring with a fault. Works only over the board's own cable.
   void give_wiring(const Wiring& wiring, Duration timeout = default_timeout);
   // The newest state, with the fields of all datagrams since the board started. state().age() is
   // its age, also while the link is lost.
@@ -378,14 +378,14 @@ class R4LINK_API Board {
 
   // Any number of callbacks of each kind, in the order in which they were added. A new callback
   // first receives the newest state, link, and transport event (up or down, and a later warning).
-  // It lasts as long as the board, unless its handle ends it (subscription.hpp).
+  // A callback ends with the board, or by its handle (subscription.hpp).
   Subscription on_state(std::function<void(const ReceivedState&)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // Called when a path starts or stops carrying.
   Subscription on_path(std::function<void(const PathStatus&)> callback);
   // The board restarted, or this computer slept longer than the board's timeout. The readings of
-  // i2c() and attach() end. The fields are requested again, unless SessionOptions::fields is empty.
+  // i2c() and attach() end. Unless SessionOptions::fields is empty, the fields are requested again.
   // A restart sets thresholds of U to 0, and may lose settings (C). Called before the new state.
   Subscription on_restart(std::function<void()> callback);
   // Why output commands are refused; none if armed.
@@ -411,8 +411,8 @@ class R4LINK_API Board {
   // For programs with an event loop (async_board.hpp, with r4link::asio only). Calls `action` with
   // the AsyncBoard on the thread of the link, and returns at once. False if the Board is closed:
   // then `action` is never called. `action` and the handlers of its operations must return at once,
-  // because heartbeats wait for them. They must not throw, call waiting functions of the Board, or
-  // open or close the AsyncBoard. close() waits for handlers.
+  // because heartbeats wait for them. `action` and handlers must not throw, call waiting functions
+  // of the Board, or open or close the AsyncBoard. close() waits for handlers.
   bool post_to_loop(std::function<void(AsyncBoard&)> action);
 
  private:

@@ -31,7 +31,7 @@ struct BridgeCounters {
       0;                   // an unsigned command that must be signed, or a setting for a cable only
   std::uint64_t late = 0;  // may have waited for more than 100 ms: the bridge was delayed
   std::uint64_t undelivered = 0;  // the other side is down or full, or its peer is unknown
-  // Of `passed`: replaced by a newer state while waiting, or dropped after 100 ms.
+  // Datagrams among `passed` that a newer state replaced, or that were dropped after 100 ms.
   std::uint64_t outdated = 0;
 };
 
@@ -57,8 +57,9 @@ struct BridgeOptions {
   // signed with one of them pass. Stops and questions always pass.
   std::vector<Key> keys;
   // A board obeys unsigned commands on its own cable. So by default a bridge to a cable passes only
-  // signed commands to a board with a key. On a network it is refused without `keys`. True: every
-  // host that reaches the hosts' side may drive the board. Not together with `keys`.
+  // signed commands to a board with a key. If the hosts are on a network, a bridge to a cable is
+  // refused without `keys`. True: every host that reaches the hosts' side may drive the board.
+  // Cannot be combined with `keys`.
   bool open = false;
   // After this silence of the served host, another host is served; at least the board's timeout.
   std::chrono::milliseconds timeout{1000};
@@ -70,8 +71,8 @@ struct BridgeOptions {
 //     r4::Bridge bridge("udp://0.0.0.0:2018", "can://can0?node=3");
 //     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
 //
-// A bridge makes no heartbeats: if the host ends, the board goes safe. It serves one host at a
-// time; every E:STOP passes. It waits for a missing device. Cable-only settings never pass.
+// A bridge makes no heartbeats: if the host ends, the board goes safe. A bridge serves one host at
+// a time. Every E:STOP passes. Cable-only settings never pass. A bridge waits for missing devices.
 class R4LINK_API Bridge {
  public:
   // `hosts`: the URL to listen on, as for r4 sim. Patterns of equal size are paired in order

@@ -33,9 +33,9 @@ enum class SendResult : std::uint8_t {
 // Why datagrams do not pass although the transport is up (CAN).
 enum class TransportTrouble : std::uint8_t {
   none,
-  // frames on the board's command id are not R4 datagrams: another protocol uses it
+  // frames on the board's command id are not R4 datagrams: another protocol uses the id
   foreign_frames,
-  late_frames,  // flow control comes too late: frames wait, or are lost
+  late_frames,  // flow control arrives too late, so frames wait or are lost
 };
 R4LINK_API const char* to_text(TransportTrouble trouble);
 
@@ -43,10 +43,10 @@ R4LINK_API const char* to_text(TransportTrouble trouble);
 struct TransferCounters {
   // Failed transfers, whose datagrams are lost:
   std::uint64_t wrong_sequence = 0;  // a frame was lost, duplicated or overtaken
-  std::uint64_t timed_out = 0;       // a frame, or the flow control for it, did not come in time
+  std::uint64_t timed_out = 0;       // a frame, or the flow control for it, did not arrive in time
   std::uint64_t overflow = 0;        // longer than max_datagram
   std::uint64_t interrupted = 0;     // another transfer began before the end
-  std::uint64_t cancelled = 0;       // the bus was down or took no frames, or there is another host
+  std::uint64_t cancelled = 0;       // the bus was down or accepted no frames, or has another host
   // Ignored frames:
   std::uint64_t unexpected = 0;  // not part of a transfer
   std::uint64_t malformed = 0;
@@ -66,7 +66,7 @@ struct CarrierCounters {
   std::uint64_t tx_dropped = 0;  // replaced by a newer state, expired or refused
   std::uint64_t tx_errors = 0;
   std::uint64_t downs = 0;                    // how often the transport went down
-  std::uint64_t ups = 0;                      // how often the transport came up
+  std::uint64_t ups = 0;                      // how often the transport went up
   std::optional<TransferCounters> transfers;  // none if a datagram is one packet or line
 };
 
@@ -137,7 +137,7 @@ class R4LINK_API Carrier {
     virtual void on_datagram(std::string_view bytes, Peer from) = 0;
     virtual void on_carrier_event(const CarrierEvent& event) = 0;
     // All arrived datagrams were passed on, so after a delay the newest state is known. After a
-    // long burst on a byte stream, this call may come only with the next datagram.
+    // long burst on a byte stream, this call may follow only with the next datagram.
     virtual void on_drained() {}
     // A datagram that another program sent to the board, if the transport receives such datagrams.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
@@ -161,7 +161,7 @@ class R4LINK_API Carrier {
 
   // Sends one datagram of at most max_datagram (1024) bytes, without a terminator. Never blocks;
   // copies `bytes` if the datagram must wait. A datagram that is not written within 100 ms is
-  // dropped and counted, unless it is a stop. A host sends to `everyone`.
+  // dropped and counted, except a stop. A host sends to `everyone`.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
   // True if the board cannot distinguish its hosts: on a bus, or through a program that shares

@@ -86,7 +86,7 @@ struct R4LINK_API Command {
   static Command relay(Channel channel, bool on);
   static Command stop();
   // `cause`: the number of the cause to clear, from CAUSE in the board's heartbeats; 0 if the
-  // heartbeats have no CAUSE. unnamed_cause: Session fills in the number, or the command has none.
+  // heartbeats have no CAUSE. unnamed_cause: Session fills in the number or omits it.
   static constexpr std::int32_t unnamed_cause = -1;
   static Command clear(std::int32_t cause = unnamed_cause);
   // Ends control: the board is safe at once, and any host may control it.
@@ -106,8 +106,8 @@ struct R4LINK_API Command {
   static Command identify();
   // Requests the board's wiring; only over the board's own cable.
   static Command ask_wiring();
-  // The board streams its states to the sender for two seconds, without control; 0 Hz ends that.
-  // `list`: the fields; empty: the fields that the controlling host has chosen.
+  // The board streams its states to the sender for two seconds, without control; 0 Hz ends the
+  // stream. `list`: the fields; empty: the fields that the controlling host has chosen.
   static Command watch(std::int32_t rate_hz, Text list = Text());
   // Transfers on the user's I2C bus (docs/how-to/devices.md). Addresses have 7 bits. Bytes are x
   // and two hexadecimal digits each, "x75"; "x": no bytes. The answer is I2CX in the state.
@@ -127,8 +127,8 @@ struct R4LINK_API Command {
 // which are executed together or not at all (docs/reference/protocol.md; setpoints.hpp).
 constexpr int max_group = 16;
 
-// Checks the ranges of a command from a factory: Refusal::format, ::channel or ::range if a value
-// is wrong. Settings and names of fields are not checked.
+// Checks the ranges of a command from a factory. If a value is wrong, returns Refusal::format,
+// ::channel or ::range. Settings and names of fields are not checked.
 R4LINK_API Refusal check_command(const Command& command);
 
 }  // namespace r4

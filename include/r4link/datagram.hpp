@@ -6,7 +6,7 @@
 //     value    = *(%x20-7E except ";" "," "^")
 //
 // read_datagram() accepts a whole datagram or nothing. A Datagram is a view: valid as long as the
-// bytes. Reading allocates nothing. It takes one pass over the bytes, and one for the CRC.
+// bytes. Reading allocates nothing, and takes one pass over the bytes and one pass for the CRC.
 #pragma once
 
 #include <cstddef>
@@ -107,7 +107,7 @@ class R4LINK_API Datagram {
 
   // The datagram's bytes without the line terminator.
   Text bytes() const { return bytes_; }
-  // The first field of that name; a Field with an empty name if the datagram has none.
+  // The first field of that name. If there is no such field: a Field with an empty name.
   Field find(Text name) const;
 
   // The checksum in the datagram: of all bytes up to and including the first `^`.
@@ -117,7 +117,7 @@ class R4LINK_API Datagram {
   std::uint32_t pnum() const { return pnum_; }
   bool has_time() const { return has_time_; }
   std::uint64_t time_ms() const { return time_ms_; }
-  // The session id (SID); no_session if the datagram has none.
+  // The session id (SID). If the datagram has no SID: no_session.
   SessionId session_id() const { return sid_; }
   // The number of fields whose names are command letters (0 or more), and the first such field.
   int command_count() const { return command_count_; }

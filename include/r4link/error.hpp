@@ -28,9 +28,9 @@ enum class ErrorKind : std::uint8_t {
 enum class Outcome : std::uint8_t {
   none,       // not about a command
   confirmed,  // by the board's state
-  refused,    // the board refused it and did not execute it (see Refusal), or a transfer failed
-              // on its bus, or the link cannot begin
-  timed_out,  // not confirmed by the deadline; the board may have executed it
+  refused,    // the board refused the command and did not execute it, or a transfer failed
+              // on its bus, or the link cannot begin; see Refusal
+  timed_out,  // not confirmed by the deadline; the command may have been executed
   cancelled,  // ended by a stop, a newer safe cause, another clock of the board, or the program
   closed,     // ended because the board was closed
   blocked,    // the board's thread does not answer: not sent, or not confirmed
@@ -56,10 +56,10 @@ struct Problem {
   std::string thing;  // the subject: a URL, a device, a command
   std::string reason;
   std::string fix;  // may be empty
-  // If it is about a command:
+  // If the problem is about a command:
   Outcome outcome = Outcome::none;
   Refusal refusal = Refusal::none;  // for Outcome::refused
-  std::uint8_t at = 0;              // failed command of a group, from 1; 0: no particular one
+  std::uint8_t at = 0;              // failed command of a group, from 1; 0: no particular command
   // The program that already controls the transport, if this is the reason.
   std::optional<Program> holder{};
 

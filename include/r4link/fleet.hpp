@@ -67,7 +67,7 @@ class R4LINK_API FleetResults {
   explicit FleetResults(std::vector<FleetResult> results) : results_(std::move(results)) {}
   bool all_confirmed() const;
   std::vector<std::size_t> failed() const;  // the numbers of the boards
-  // If boards have not confirmed, throws Error{refused} about the first one, and counts the others.
+  // If boards did not confirm, throws Error{refused} about the first, and counts further boards.
   void require() const;
 
   std::size_t size() const { return results_.size(); }
@@ -156,7 +156,7 @@ class R4LINK_API Fleet {
   FleetResults send(const Command& command, Duration timeout = default_timeout);
   FleetResults send(const Boards& boards, const Command& command,
                     Duration timeout = default_timeout);
-  // The same from text: "O:358,1,1", or a group "O:358,1,1;O:358,1,2".
+  // Sends a command from text: "O:358,1,1", or a group "O:358,1,1;O:358,1,2".
   FleetResults send(std::string_view text, Duration timeout = default_timeout);
   FleetResults send(const Boards& boards, std::string_view text,
                     Duration timeout = default_timeout);
@@ -166,10 +166,10 @@ class R4LINK_API Fleet {
   FleetResults arm(Duration timeout = default_timeout);
   FleetResults arm(const Boards& boards, Duration timeout = default_timeout);
 
-  // Sends E:STOP to all boards in one pass before it waits, and repeats it until each board has
-  // confirmed it. One frame on each CAN bus stops all boards of the bus, also boards outside the
-  // fleet. If a board does not confirm, no error is thrown: its result advises to cut the power,
-  // and the stop is repeated to this board and its bus for default_timeout more.
+  // Sends E:STOP to all boards in one pass before it waits, and repeats E:STOP until each board has
+  // confirmed the stop. One frame on each CAN bus stops all boards of the bus, also boards outside
+  // the fleet. If a board does not confirm, no error is thrown. The board's result advises to cut
+  // the power, and the stop is repeated to this board and its bus for default_timeout more.
   FleetResults stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
@@ -177,7 +177,7 @@ class R4LINK_API Fleet {
   // results are in the order of `setpoints`.
   std::vector<PostResult> post(const std::vector<BoardSetpoints>& setpoints);
 
-  // Waits for the next event, oldest first; empty if none comes. Keeps the newest 4096 events.
+  // Waits for the next event, oldest first. Empty if no event arrives. Keeps the last 4096 events.
   std::optional<FleetEvent> next_event(Duration timeout = Duration{0});
 
   void record(Recording& recording);

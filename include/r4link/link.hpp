@@ -103,7 +103,7 @@ struct LinkStatus {
   LinkCauses causes{};
   bool in_control = false;    // the board accepts this host's commands, which are sent at once
   std::uint8_t carrying = 0;  // the paths that carry: bit 0 is the first
-  ChipFault chip{};           // the cause of SafeReason::fault, if it is a chip
+  ChipFault chip{};           // if a chip causes SafeReason::fault: the chip
 
   std::optional<LinkCause> cause() const { return causes.first(); }
   // True if the link cannot begin because the paths lead to two boards.
@@ -148,9 +148,9 @@ struct CommandResult {
   Refusal code = Refusal::none;              // for refused
   Time elapsed{0};                           // from the call to the end of the command
   DisarmCause disarmed = DisarmCause::none;  // for not_armed
-  // Of a group, `at` is the number of the refused command, from 1; 0: no particular command. If the
-  // commands are sent one by one, `at` is the command that was under way at the end. `executed`:
-  // the number of commands before `at` that were executed.
+  // For a group, `at` is the number of the refused command, from 1; 0: no particular command. If
+  // the commands are sent one by one, `at` is the command that was under way at the end.
+  // `executed`: the number of commands before `at` that were executed.
   std::uint8_t at = 0;
   std::uint8_t executed = 0;
   // Packet number of the command, as in I2CX of the state. 0: not sent.
@@ -187,8 +187,8 @@ struct RefusedPost {
   Command command;               // without texts
   Refusal code = Refusal::none;  // the board's refusal; none if not sent: see `why`
   PostResult why = PostResult::sent;
-  // Of a refused group, no command was executed. `at`: the number of `command` in the group, from
-  // 1. If `at` is 0, the refusal concerns the whole group, and `command` is its first command.
+  // If a group was refused, no command was executed. `at`: the number of `command` in the group,
+  // from 1. If `at` is 0, the refusal concerns the whole group, and `command` is its first command.
   std::uint8_t at = 0;
   std::uint8_t group = 1;  // number of commands in the group
 };
@@ -207,8 +207,8 @@ struct ReceivedState : State {
   // The instant when the board's clock began to show t_ms, on this computer's clock, estimated from
   // arrival times and answers. The board reads its inputs within a millisecond after this instant.
   Clock::time_point sampled = never;
-  // Largest error of `sampled`. `unknown` before the first answer, and for a watcher on CAN, which
-  // sends no questions. If it is unknown, the sample was not later than `sampled`.
+  // Largest error of `sampled`. Before the first answer, and for a watcher on CAN, which sends no
+  // questions: `unknown`. The sample was then not later than `sampled`.
   Clock::duration sampled_error = unknown;
   static constexpr Clock::duration unknown = Clock::duration::max();
   bool any() const { return received != never; }

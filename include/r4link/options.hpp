@@ -43,8 +43,8 @@ struct SessionOptions {
   std::chrono::milliseconds stop_retry{20};
   // How long a stop is repeated after it is confirmed.
   std::chrono::milliseconds stop_linger{200};
-  // Period of Q:ID; 0: never. Then the round trip and ReceivedState::sampled_error stay unknown,
-  // and with one path identity() stays empty until the program calls identify() or sends a group.
+  // Period of Q:ID; 0: never. Without Q:ID, the round trip and ReceivedState::sampled_error stay
+  // unknown, and with one path identity() stays empty until identify() or a group is sent.
   std::chrono::milliseconds identify_interval{1000};
   // Each host needs its own key id: with a shared id, the slower host looks like a replay.
   std::optional<Key> key;

@@ -7,9 +7,9 @@
 //     left.record(recording);
 //     right.record(recording);
 //
-// It holds datagrams in both directions, also damaged datagrams, with the host's time, and events
-// of transports and links. A thread writes to the disk four times a second: a crash costs at most
-// the last second. The link never waits for the disk: 4 MiB are buffered, and lost records are
+// A recording holds datagrams in both directions, also damaged datagrams, with the host's time, and
+// events of transports and links. A thread writes to the disk four times a second: a crash costs at
+// most the last second. The link never waits for the disk: 4 MiB are buffered, and lost records are
 // counted. If the disk is full, the recording ends, on_event() reports that (kind open), and the
 // link continues. If another program moves, removes or truncates the file, the recording continues
 // in a new file of that name, and on_event() reports that.
@@ -31,8 +31,8 @@ namespace r4 {
 class Recorder;
 
 struct RecordingOptions {
-  // Starts a new file after this size or time, whichever comes first; 0: no limit. With any limit,
-  // drive.r4log becomes drive-00001.r4log, drive-00002.r4log …, each complete in itself.
+  // Starts a new file after this size or time, whichever is reached first; 0: no limit. With any
+  // limit, drive.r4log becomes drive-00001.r4log, drive-00002.r4log …, each complete in itself.
   std::uint64_t rotate_bytes = 0;
   std::chrono::seconds rotate_after{0};
   // Total bytes to keep: the oldest of the numbered files are removed, also files of earlier runs.

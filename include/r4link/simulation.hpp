@@ -25,8 +25,8 @@ namespace r4::sim {
 class R4LINK_API SimulatedRobot {
  public:
   SimulatedRobot();
-  // With a robot model in place of the bench vehicle. The board's thread calls the model once a
-  // simulated millisecond. The model must outlive every link.
+  // A world with a robot model in place of the bench vehicle. The board's thread calls the model
+  // once a simulated millisecond. The model must outlive every link.
   explicit SimulatedRobot(RobotModel& robot);
   ~SimulatedRobot();
   SimulatedRobot(const SimulatedRobot&) = delete;
@@ -35,8 +35,8 @@ class R4LINK_API SimulatedRobot {
   // "sim:?robot=1": the board in this world, for one link at a time while this object exists.
   const std::string& url() const;
 
-  // Makes an event happen, "us 1 15" (docs/how-to/simulation.md lists all): if the board is open,
-  // soon, perhaps after the return. Throws Error{data} for an unknown event.
+  // Makes an event happen, "us 1 15" (docs/how-to/simulation.md lists all). If the board is open,
+  // the event happens soon, perhaps after the return. Throws Error{data} for an unknown event.
   void happen(std::string_view words);
 
   struct Look {

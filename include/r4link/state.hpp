@@ -161,7 +161,7 @@ struct State {
 
 // The name on the wire, "AIN24".
 R4LINK_API Text name_of(StateField field);
-// The field with this name; StateField::count if there is none. Constant time.
+// The field with this name. If there is no such field: StateField::count. Constant time.
 R4LINK_API StateField state_field(Text name);
 
 // Reads `F`: "DEFAULT", "ALL" or names, with commas. Refusal::unknown for another word.

@@ -16,8 +16,8 @@ class R4LINK_API Subscription {
   Subscription() = default;  // an ended subscription
   explicit Subscription(const std::shared_ptr<Subscriber>& subscriber) : subscriber_(subscriber) {}
 
-  // Ends the callback. After the return the callback does not run, unless it called cancel()
-  // itself. Idempotent; any thread; also after the board is destroyed.
+  // Ends the callback. After the return the callback does not run, except a callback that called
+  // cancel(). Idempotent; any thread; also after the board is destroyed.
   void cancel();
 
  private:

@@ -171,7 +171,7 @@ constexpr int dac_channels = 2;
 constexpr std::int32_t dac_max_mv = 3300;
 constexpr int gpio_channels = 8;  // inputs
 
-// If there is room, a state repeats the previous state's new bytes, so one lost state loses none.
+// If there is room, a state repeats the previous state's new bytes: one lost state loses no byte.
 struct UartBytes {
   std::uint32_t position =
       0;  // of the first byte of `data`, in all bytes kept since the board started; wraps
@@ -182,7 +182,7 @@ struct UartBytes {
 
 // Identifies a host's session (SID): 64 random bits, new for each session.
 using SessionId = std::uint64_t;
-// In datagrams of watchers and paper hosts, and in datagrams for everyone.
+// The id in datagrams of watchers and paper hosts, and in datagrams for everyone.
 constexpr SessionId no_session = 0;
 
 // The code in `N:<PNum>,<code>`: why a board refuses a command (docs/reference/protocol.md).
@@ -197,7 +197,7 @@ enum class Refusal : std::uint8_t {
   safe,       // the outputs are in the safe state
   busy,       // another host controls the board
   auth,       // not authenticated
-  full,       // no room: send it again later
+  full,       // no room: send the command again later
 };
 
 // "UNKNOWN", "FORMAT" …; "NONE" for none.
@@ -206,7 +206,8 @@ R4LINK_API Text name_of(Refusal refusal);
 R4LINK_API Refusal refusal_from(Text name);
 
 // A board's refusal of a command. `session`: SESSION, the number of the heartbeat that started the
-// session. Sent only to the session's host, it shows whether the board remembers executed commands.
+// session. Only the session's host gets SESSION, which shows whether the board remembers executed
+// commands.
 struct Nack {
   std::uint32_t pnum = 0;
   Refusal code = Refusal::none;
@@ -218,10 +219,10 @@ struct Nack {
 };
 
 enum class HostLinkState : std::uint8_t {
-  connecting,  // no valid datagram has come, or the board is booting
+  connecting,  // no valid datagram has arrived, or the board is booting
   active,      // the board reports its state, and no safe reason
   safe,        // the board reports a safe reason
-  lost,        // no valid datagram of the board came for the timeout
+  lost,        // no valid datagram of the board arrived for the timeout
 };
 
 constexpr bool is_heard(HostLinkState state) {
@@ -250,7 +251,7 @@ constexpr Peer everyone = 0;
 
 enum class Priority : std::uint8_t {
   state,  // a newer state replaces a waiting state
-  // W; waits as `normal`; has its own frame on a bus (docs/reference/can.md)
+  // W, which waits as `normal` and has its own frame on a bus (docs/reference/can.md)
   lease,
   normal,  // refused if the queue is full
   stop,    // overtakes all other datagrams and is never dropped

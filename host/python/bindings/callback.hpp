@@ -33,7 +33,7 @@ class KeptThreadState {
     const py::gil_scoped_acquire gil;
     kept_.reset();
   }
-  // Call it with the GIL.
+  // Call of_this_thread() with the GIL.
   static void of_this_thread() {
     static thread_local KeptThreadState state;
     if (!state.kept_) state.kept_ = std::make_unique<py::gil_scoped_acquire>();

@@ -12,7 +12,7 @@
 #include "r4link/devices/description.hpp"
 #include "r4link/fleet.hpp"
 
-// EACH(class in Python, type in C++). Of a PostResult, the value() is converted.
+// EACH(class in Python, type in C++). For a PostResult, the value() is converted.
 #define R4_ENUMS(EACH)                       \
   EACH(BoardRole, r4::BoardRole)             \
   EACH(DeviceRole, r4::DeviceRole)           \

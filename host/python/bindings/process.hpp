@@ -22,7 +22,7 @@ class OfThisProcess {
       : what_(what), value_(std::move(value)) {}
   OfThisProcess(OfThisProcess&&) noexcept = default;
   OfThisProcess& operator=(OfThisProcess&&) = delete;
-  // Call it with the GIL, which is released while the value is destroyed.
+  // Needs the GIL, which is released while the value is destroyed.
   ~OfThisProcess() {
     if (!value_) return;
     if (!is_here()) {

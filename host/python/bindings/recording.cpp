@@ -42,7 +42,7 @@ struct Measured {
   std::size_t value;
   std::string value_name, name;  // "gyro_z", and the column's name
   std::vector<double> numbers;
-  bool here = true;  // false if another device has replaced it
+  bool here = true;  // false if another device has replaced the device
 };
 
 // The measured values of one board, whose bus has 112 addresses.

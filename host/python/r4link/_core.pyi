@@ -103,7 +103,7 @@ class Statistics(_Record):
     def late(self) -> int: ...
     @property
     def old(self) -> int:
-        """Datagrams that came too late to be recognised as duplicates."""
+        """Datagrams that arrived too late to be recognised as duplicates."""
     @property
     def restarts(self) -> int: ...
     @property
@@ -199,7 +199,7 @@ class State:
         """The board's clock; wraps at 2^32."""
     @property
     def received(self) -> float | None:
-        """When the state came, by time.monotonic(); None if there is no state."""
+        """When the state arrived, by time.monotonic(); None if there is no state."""
     @property
     def sampled(self) -> float | None:
         """When the board sampled the state, from the board's clock and round trips; as time.monotonic()."""
@@ -359,7 +359,7 @@ class Command:
         """The command of a text: Command.parse('O:358,1,1') is Command.osmc(1, pwm=358). Raises
         UsageError if the text is not a valid command, or a value is outside its range."""
     def describe(self) -> str:
-        """In words with units: 'OSMC 1 forward, duty 0.087'. A key or password is hidden."""
+        """The command in words with units: 'OSMC 1 forward, duty 0.087'. A key or password is hidden."""
 
 class Setpoints:
     """Output commands that a board executes together, in one pass over its chips, or not at all.
@@ -473,22 +473,22 @@ class FoundBoard(_Record):
     """A board that discover() has found: include/r4link/discovery/discover.hpp."""
     @property
     def url(self) -> str:
-        """The URL that opens it: 'serial:?sn=…', 'can://can0?node=1', 'udp:?id=left-arm'."""
+        """The URL that opens the board: 'serial:?sn=…', 'can://can0?node=1', 'udp:?id=left-arm'."""
     @property
     def place(self) -> str:
-        """Where it was found: `path` of a port, `interface` of a bus or `address` of a network."""
+        """Where the board was found: `path` of a port, `interface` of a bus or `address` of a network."""
     @property
     def address(self) -> str:
-        """UDP: its IPv4 address; else ''."""
+        """UDP: the board's IPv4 address; else ''."""
     @property
     def node(self) -> int:
-        """CAN: its number on the bus, 0 to 31."""
+        """CAN: the board's number on the bus, 0 to 31."""
     @property
     def identity(self) -> Identity | None:
         """None: the board did not report its identity."""
     @property
     def busy(self) -> bool | None:
-        """True if a host controls it; None: unknown."""
+        """True if a host controls the board; None: unknown."""
     @property
     def holder(self) -> Program | None:
         """Serial and CAN: the program of this computer that holds the transport. Name '': no answer."""
@@ -497,7 +497,7 @@ class FoundBoard(_Record):
         """False: the holder watches."""
     @property
     def foreign_frames(self) -> bool:
-        """CAN: another protocol uses the board's command id, so the board was not asked."""
+        """CAN: another protocol uses the board's command id, so Q:ID was not sent."""
 
 class SearchedPort(_Record):
     @property
@@ -513,13 +513,13 @@ class SearchedPort(_Record):
     def description(self) -> str: ...
     @property
     def is_r4(self) -> bool:
-        """True if it has the USB id of a board."""
+        """True if the port has the USB id of a board."""
     @property
     def asked(self) -> bool:
-        """True if the port was asked, or a program of this computer holds it."""
+        """True if Q:ID was sent, or a program of this computer holds the port."""
     @property
     def trouble(self) -> str | None:
-        """Why the port could not be asked."""
+        """Why Q:ID could not be sent."""
 
 class SearchedBus(_Record):
     @property
@@ -538,7 +538,7 @@ class SearchedBus(_Record):
         """In bit/s; 0: unknown."""
     @property
     def trouble(self) -> str | None:
-        """Why no board could be heard."""
+        """Why the search could not listen."""
 
 class SearchedNetwork(_Record):
     @property
@@ -548,7 +548,7 @@ class SearchedNetwork(_Record):
         """The IPv4 address of this computer in that network."""
     @property
     def trouble(self) -> str | None:
-        """Why the question could not be sent."""
+        """Why Q:ID could not be sent."""
 
 class Discovery:
     """The boards that discover() has found, and where it has searched."""
@@ -570,7 +570,7 @@ class Discovery:
 def discover(*, serial: bool = True, can: bool = True, udp: bool = True, serial_ports: Sequence[str] = (),
              udp_port: int = 2018) -> Discovery:
     """The boards that this computer reaches, as `r4 list` shows them. Blocks for up to 1.3 s.
-    `serial_ports`: paths of ports to ask, with any USB id. `udp_port`: 1 to 65535, where
+    `serial_ports`: paths of further ports to search, with any USB id. `udp_port`: 1 to 65535, where
     boards listen."""
 
 def shipped_devices() -> list[str]: ...

@@ -182,7 +182,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
             return self._core.next_state(1)  # raises the error
 
     def identify(self, timeout: float = 1.0) -> Coroutine[Any, Any, Identity]:
-        """Asks the board for its identity. `timeout`: seconds to wait for the answer."""
+        """Requests the board's identity. `timeout`: seconds to wait for the answer."""
         identity: Coroutine[Any, Any, Identity] = self._call(lambda core: core.identify(_ms(timeout)))
         return identity
 
@@ -210,7 +210,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
 
 
 async def discover(**options: Any) -> Discovery:
-    """As r4link.discover(). The search takes at most 1.3 s. Cancelling the task does not end it."""
+    """As r4link.discover(). The search takes at most 1.3 s. Cancelling the task does not end the search."""
     return await asyncio.get_running_loop().run_in_executor(None, lambda: _core.discover(**options))
 
 

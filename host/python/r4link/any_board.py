@@ -25,7 +25,7 @@ class AnyBoard(ABC, Generic[Sent]):
     @abstractmethod
     def _call(self, call: Callable[[Core], Any],
               then: Callable[[Any], Any] = lambda result: result) -> Any:
-        """Makes a call that waits. Returns then(result), or a coroutine of it."""
+        """Makes a call that waits. Returns then(result), or its coroutine."""
 
     @abstractmethod
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
@@ -37,9 +37,9 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.role()
 
     def take_control(self) -> Sent:
-        """Makes this program control the board; callbacks and recordings stay. It begins disarmed:
-        call wait_active() and arm(). If another program of this computer controls the board,
-        take_control() raises RefusedError with the `holder`, and this program continues to watch."""
+        """Makes this program control the board; callbacks and recordings stay. The program is then disarmed: call
+        wait_active() and arm(). If another program of this computer controls the board, take_control() raises
+        RefusedError with the `holder`, and this program continues to watch."""
         sent: Sent = self._call(lambda core: core.take_control())
         return sent
 
@@ -52,7 +52,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return sent
 
     def wait_active(self, timeout: float = 3.0) -> Sent:
-        """Waits until this program controls the board or, as a watcher, hears it. Raises
+        """Waits until this program controls the board or, as a watcher, receives its states. Raises
         RefusedError with the link's state and cause."""
         sent: Sent = self._call(lambda core: core.wait_active(_ms(timeout)))
         return sent
@@ -71,12 +71,12 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.post(command)
 
     def arm(self, timeout: float = 1.0) -> Sent:
-        """Allows output commands. Call it before the first output command, and again after the
+        """Allows output commands. Call arm() before the first output command, and again after the
         outputs went safe, except after a lost link.
 
-        Clears a stop, a watchdog or a fault that came while this program controlled the board, and
-        closes relay 1. Does not clear a cause that may be older than the program, or a fault with
-        which the board began. arm() then raises NotArmedError, and Command.clear() clears the cause.
+        Clears a stop, a watchdog or a fault that began while this program controlled the board, and closes relay 1.
+        Does not clear a cause that may be older than the program, or a fault with which the board began. arm() then
+        raises NotArmedError, and Command.clear() clears the cause.
         """
         sent: Sent = self._call(lambda core: core.arm(_ms(timeout)))
         return sent
@@ -121,8 +121,8 @@ class AnyBoard(ABC, Generic[Sent]):
         return BldcChannel(self, channel)
 
     def dac(self, channel: int, *, millivolts: int, timeout: float = 1.0) -> Sent:
-        """Sets a voltage: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. This is an
-        output command, so arm() is needed. Command.dac() can be posted, and can be one of Setpoints."""
+        """Sets a voltage: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. This
+        output command needs arm(). Command.dac() can be posted, and can be one of Setpoints."""
         return self.send(Command.dac(channel, millivolts=millivolts), timeout)
 
     def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
@@ -139,7 +139,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self.send(f'C:{key},{value}', timeout)
 
     def give_wiring(self, wiring: Wiring, timeout: float = 1.0) -> Sent:
-        """Checks `wiring` and gives it to the board, which uses it from its next start on. Works only over the board's
+        """Checks `wiring` and sends it to the board, which uses it from its next start on. Works only over the board's
         own cable. Raises DataError for a wiring with a fault."""
         wiring.check()
         return self.setting('wiring', wiring.setting, timeout)
@@ -149,7 +149,7 @@ class AnyBoard(ABC, Generic[Sent]):
         which needs arm(), and starts the board's readings until this session ends. `timeout`: for
         each step. Raises RefusedError if the device does not answer or is another device. Raises
         UsageError if a device with another address or name has one of the slots: i2c.poll_off()
-        frees a slot. Call it again after on_restart() and a lost link."""
+        frees a slot. Call attach() again after on_restart() and a lost link."""
         sent: Sent = self._call(lambda core: core.attach(device._core, _ms(timeout)))
         return sent
 
@@ -163,7 +163,7 @@ class AnyBoard(ABC, Generic[Sent]):
 
     @property
     def state(self) -> State:
-        """The newest state; false if none. `received`: on the clock of time.monotonic()."""
+        """The newest state; false before the first state. `received`: on the clock of time.monotonic()."""
         return self._core.state()
 
     @property

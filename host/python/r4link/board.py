@@ -50,7 +50,7 @@ class States:
         return self
 
     def __next__(self) -> State:
-        """Raises RefusedError if no state comes within the timeout. If lossless, raises DataError
+        """Raises RefusedError if no state arrives within the timeout. If lossless, raises DataError
         where states were lost; the next call returns the first state after the loss."""
         while (state := self._board.take(self._states, self._timeout_ms)) is None:
             if self._states.ended:
@@ -59,7 +59,7 @@ class States:
         return state
 
     def take(self) -> State | None:
-        """The next state if one waits, else None."""
+        """The next waiting state, or None."""
         return self._board.take(self._states, 0)
 
     @property
@@ -132,7 +132,7 @@ class Board(AnyBoard[None]):
 
     def close(self) -> None:
         """Sends the farewell and closes the transport: the board goes safe at once. Waiting calls
-        in other threads raise ClosedError. Idempotent; a callback may call it."""
+        in other threads raise ClosedError. Idempotent; a callback may call close()."""
         self._core.close()
 
     def __enter__(self) -> Self:
@@ -156,7 +156,7 @@ class Board(AnyBoard[None]):
         return Uarts(lambda channel: Uart(self, channel))
 
     def identify(self, timeout: float = 1.0) -> Identity:
-        """Asks the board for its identity. `timeout`: seconds to wait for the answer."""
+        """Requests the board's identity. `timeout`: seconds to wait for the answer."""
         return self._core.identify(_ms(timeout))
 
     def wiring(self, timeout: float = 1.0) -> BoardWiring:

@@ -32,7 +32,7 @@ def _close_all() -> None:
 
 
 class BridgeCounters(NamedTuple):
-    """The datagrams that came from one side, by what the bridge did with them."""
+    """The datagrams from one side, by what the bridge did with them."""
     passed: int
     stops: int  # the emergency stops among `passed`
     # Dropped:
@@ -42,7 +42,7 @@ class BridgeCounters(NamedTuple):
     refused: int  # a missing signature, or a setting that only a cable may change
     late: int  # may have waited for more than 100 ms, because the bridge was delayed
     undelivered: int  # the other side is down, full, or has no known peer
-    # Of `passed`: at the other side, replaced by a newer state or dropped after 100 ms.
+    # Datagrams among `passed` that a newer state replaced, or that were dropped after 100 ms.
     outdated: int
 
 

@@ -70,8 +70,8 @@ class ServoChannel(_Channel[Sent]):
     """A servo, driven by its pulse or, once it is calibrated, by its angle."""
 
     def calibrate(self, calibration: ServoCalibration) -> None:
-        """Call it once before driving this servo in degrees. The Board keeps the calibration, also
-        while the link is lost; it is not sent to the board."""
+        """Call calibrate() once before driving this servo in degrees. The Board keeps the
+        calibration, also while the link is lost. The calibration is not sent to the board."""
         self._board._core.calibrate_servo(self._channel, calibration)
 
     @property
@@ -162,8 +162,8 @@ class BldcChannel(_Channel[Sent]):
 class I2c(Generic[Sent, Read, Scanned]):
     """The devices on the user's I2C bus (docs/how-to/devices.md). read(), write() and scan() return when
     the device has answered, and raise RefusedError without an answer. `address`: 0x08 to 0x77,
-    without the read bit. `register`: 0 to 255, or up to 2 bytes; b'' names none. `count`: up to 32
-    bytes. `slot`: 1 to 8."""
+    without the read bit. `register`: 0 to 255, or up to 2 bytes; b'' names no register. `count`: up
+    to 32 bytes. `slot`: 1 to 8."""
 
     def __init__(self, board: AnyBoard[Sent]) -> None:
         self._board = board
@@ -199,20 +199,19 @@ class I2c(Generic[Sent, Read, Scanned]):
 
 
 class UartChannel(Generic[Sent]):
-    """A UART of the user; `channel`: 1 or 2 (docs/how-to/devices.md). setting('uart1', '115200:8N1') turns
-    it on, and fields('DEFAULT,UART1') makes the board report its bytes."""
+    """A UART of the user; `channel`: 1 or 2 (docs/how-to/devices.md). setting('uart1', '115200:8N1') turns the UART on,
+    and fields('DEFAULT,UART1') makes the board report its bytes."""
 
     def __init__(self, board: AnyBoard[Sent], channel: int) -> None:
         self._board, self._channel = board, channel
 
     def write(self, data: bytes, timeout: float = 1.0) -> Sent:
-        """Writes 1 to 48 bytes; returns when the board has all bytes. May move something, so arm() is
-        needed."""
+        """Writes 1 to 48 bytes; returns when the board has all bytes. A write may move something, so it needs arm()."""
         return self._board.send(f'X:UART,{self._channel},x{bytes(data).hex()}', timeout)
 
     def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
         """Adds a callback for later bytes, independent of read(). The callback gets each byte once,
-        in order, and the number of missing bytes. It runs on the thread of the board's callbacks."""
+        in order, and the number of missing bytes. The callback runs on the thread of the board's callbacks."""
         return self._board._core.uart_on_bytes(self._channel, self._board._callback(callback))
 
 

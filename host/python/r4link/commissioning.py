@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks a board step by step with a person, and learns how it is wired (docs/how-to/commissioning.md).
+"""Checks a board step by step with a person, and learns its wiring (docs/how-to/commissioning.md).
 
     class AtMyBench(r4link.commissioning.Person):
         def ask(self, question): ...

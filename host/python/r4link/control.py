@@ -86,10 +86,10 @@ class Pid:
 
 
 class Wheel:
-    """A wheel with an encoder: give it each state, in order. `encoder`: 1 to 4. `counts_a_turn`:
-    counts of the encoder for one turn of the wheel. `radius`: metres. `window`: seconds over which
-    `speed` is the mean. `max_speed`: m/s; a faster change means a zeroed encoder or a restart, not
-    a movement."""
+    """A wheel with an encoder: pass each state to advance(), in order. `encoder`: 1 to 4.
+    `counts_a_turn`: counts of the encoder for one turn of the wheel. `radius`: metres. `window`:
+    seconds over which `speed` is the mean. `max_speed`: m/s; a faster change means a zeroed encoder
+    or a restart, not a movement."""
 
     def __init__(self, encoder: int, counts_a_turn: float, radius: float, *, reversed: bool = False,
                  window: float = 0.05, max_speed: float = 20.0) -> None:
@@ -223,7 +223,7 @@ class Odometry:
 
 
 class Standstill(NamedTuple):
-    """A motor with an encoder. At `pwm` or more, it turns by more than `counts` in `time` seconds."""
+    """A motor with an encoder. At `pwm` or more, the motor turns by more than `counts` in `time` seconds."""
     encoder: int = 1
     channel: int = 1
     drive: Literal['osmc', 'dhb12', 'bldc'] = 'osmc'
@@ -256,24 +256,24 @@ class LoopGuard:
         self._core = _core.LoopGuard(_options(fields, late, first, standstill, Setpoints(), 0.2, 0.3))
 
     def start(self, now: float) -> None:
-        """Call it when the loop begins."""
+        """Call start() when the loop begins."""
         self._core.start(now)
 
     def on_state(self, state: State, disarmed_by: DisarmCause | str, now: float) -> float | None:
-        """The seconds since the last step, on the board's clock, if a step is due; else None."""
+        """If a step is due: the seconds since the last step, on the board's clock. Otherwise None."""
         return self._core.on_state(state, disarmed_by, now)
 
     def on_commanded(self, setpoints: Setpoints) -> None:
-        """Call it with the commands of the step. A motor without a command keeps its earlier command."""
+        """Call on_commanded() with the commands of the step. A motor without a command keeps its earlier command."""
         self._core.on_commanded(setpoints)
 
     def check(self, link: LinkState | str, disarmed_by: DisarmCause | str, now: float) -> LoopEnd:
-        """Call it at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
+        """Call check() at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
         return self._core.check(link, disarmed_by, now)
 
     @property
     def deadline(self) -> float:
-        """When the loop is late if no state comes before: seconds of time.monotonic()."""
+        """If no state arrives before, the loop is late at this time. Seconds of time.monotonic()."""
         return self._core.deadline
 
     @property

@@ -83,7 +83,7 @@ class Device:
 
     def is_set_up(self, state: State) -> bool | None:
         """False if the device was reset: attach it again, because its values are not measurements.
-        None if it was not read yet, or does not show a reset."""
+        None if the device was not read yet, or does not show a reset."""
         return self._core.is_set_up(state)
 
     def reading(self, state: State, value: str) -> DeviceReading:

@@ -5,10 +5,10 @@
       DataError            a datagram, a recording or a file is bad
       UsageError           a URL, an option or a command is wrong (also a ValueError)
       RefusedError         the board refused or did not confirm; `refusal`: Refusal.SAFE, …
-        NotConfirmedError  no confirmation in time: it may have been executed (also a TimeoutError)
-        CancelledError     given up by the program, or because a stop or a newer cause came first
+        NotConfirmedError  no confirmation in time: the command may have been executed (also a TimeoutError)
+        CancelledError     given up by the program, or because a stop or a newer cause arrived first
         ClosedError        the board was closed, or belongs to another process
-        NotArmedError      not sent: it drives an output, and the program is not armed: arm()
+        NotArmedError      not sent: the command drives an output, and the program is not armed: arm()
       OpenError            the transport cannot be opened or has disconnected (also an OSError)
       DeniedError          the system denies access (also an OSError)
       UnsupportedError     kernel support or an interface is missing
@@ -76,7 +76,7 @@ class NotConfirmedError(RefusedError, TimeoutError):
 
 
 class CancelledError(RefusedError):
-    """Given up by the program, or because a stop or a newer cause came first."""
+    """Given up by the program, or because a stop or a newer cause arrived first."""
 
 
 class ClosedError(RefusedError):
@@ -84,7 +84,7 @@ class ClosedError(RefusedError):
 
 
 class NotArmedError(RefusedError):
-    """Not sent: it drives an output, and the program is not armed."""
+    """Not sent: the command drives an output, and the program is not armed."""
 
 
 class OpenError(Error, OSError):

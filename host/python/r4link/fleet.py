@@ -136,7 +136,7 @@ class Fleet:
         return self._core.url(board)
 
     def wait_active(self, timeout: float = 3.0) -> None:
-        """Waits until this program controls all boards or, as a watcher, hears them."""
+        """Waits until this program controls all boards or, as a watcher, receives their states."""
         missing = self._core.wait_active(_ms(timeout))
         if missing:
             others = f' (and {len(missing) - 1} other boards)' if len(missing) > 1 else ''
@@ -181,7 +181,7 @@ class Fleet:
         return self._core.post(self._pairs(setpoints))
 
     def next_event(self, timeout: float = 0.0) -> FleetEvent | None:
-        """The oldest event that was not taken yet; None if no event comes within `timeout`."""
+        """The oldest event that was not taken yet; None if no event arrives within `timeout`."""
         event = self._core.next_event(_ms(timeout))
         return None if event is None else FleetEvent(*event)
 

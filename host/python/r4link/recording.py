@@ -64,8 +64,8 @@ class Log(NamedTuple):
 
 
 def read(path: str | os.PathLike[str], datagrams: bool = False) -> Log:
-    """Reads a recording, compressed or not. Raises OpenError, DeniedError, and DataError if it is
-    not a recording. Damage within it is listed in `damage`, and the rest is read."""
+    """Reads a recording, compressed or not. Raises OpenError, DeniedError, and DataError if the
+    file is not a recording. Damage is listed in `damage`, and the rest is read."""
     import numpy as np
 
     def times(us: Any) -> Any:

@@ -52,8 +52,8 @@ class Robot(Protocol):
 class SimProcess:
     """A simulated board in its own process, `r4 sim`: from the variable R4, or on PATH.
 
-    The argument `url` is where it listens: 'udp://127.0.0.1:0', 'pty:PATH', 'can://vcan0?node=3'.
-    The attribute `url` is the URL for a host. Raises OpenError if it does not listen.
+    The argument `url` is where the board listens: 'udp://127.0.0.1:0', 'pty:PATH', 'can://vcan0?node=3'.
+    The attribute `url` is the URL for a host. Raises OpenError if the board does not listen.
     """
 
     def __init__(self, url: str, *options: str) -> None:

@@ -2,7 +2,7 @@
 """Transports of your own: a subclass of Transport moves datagrams, and CanTransport takes any bus
 of python-can.
 
-open(), send() and close() are called on a thread of their own. They may wait, because the link continues meanwhile.
+open(), send() and close() run on a thread of their own, and may wait, because the link continues meanwhile.
 
 The heartbeats on such a transport need the interpreter. If a program keeps the interpreter busy for
 a second, the link is lost, and the board goes safe.
@@ -40,7 +40,7 @@ class Transport:
     An object serves one board at a time. Datagrams may be lost and reordered, as on UDP.
     """
 
-    _receive: Callable[..., None] | None = None  # while it is open
+    _receive: Callable[..., None] | None = None  # while the transport is open
 
     @property
     def name(self) -> str:
@@ -48,19 +48,19 @@ class Transport:
         return type(self).__name__
 
     def open(self) -> None:
-        """Begins to receive. Opening a Board waits for the first call, without limit; if it raises, the Board raises
-        OpenError."""
+        """Begins to receive. Opening a Board waits for the first call, without limit. If open() raises, the Board
+        raises OpenError."""
 
     def send(self, datagram: bytes) -> None:
         """Sends one datagram. A later datagram waits for 100 ms at most, a stop without a limit."""
         raise NotImplementedError(f'{type(self).__name__} has no send()')
 
     def close(self) -> None:
-        """Undoes open(). Not called after an open() that raised. Board.close() waits 1 s for it."""
+        """Undoes open(). Not called after an open() that raised. Board.close() waits 1 s for this close()."""
 
     def received(self, datagram: bytes) -> None:
-        """Call it with each received datagram, from any thread. Does not wait. Does nothing while the
-        transport is closed. Raises UsageError for more than 1024 bytes."""
+        """Call received() with each received datagram, from any thread. Does not wait. Does nothing while the transport
+        is closed. Raises UsageError for more than 1024 bytes."""
         receive = self._receive
         if receive is not None:
             receive(memoryview(datagram).tobytes())

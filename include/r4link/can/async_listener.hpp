@@ -30,7 +30,7 @@ class CanListener {
   const CanSurvey& survey() const;
   // The clock of the survey's frames, in microseconds; wraps.
   static std::uint32_t now_us();
-  // True if CAN FD frames with a switched bit rate came: the survey's sums need rate.data.
+  // True if CAN FD frames with a switched bit rate arrived: the survey's sums need rate.data.
   bool heard_rate_switch() const;
   // True while the interface is down or a warning applies.
   bool in_trouble() const;

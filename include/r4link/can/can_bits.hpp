@@ -6,11 +6,11 @@
 //              |<- nominal ->|<-- data rate ------->|<------- nominal ------->|
 //
 // After five equal bits a complementary bit is stuffed (10.5). The CRC field of an FD frame instead
-// has a stuff bit at its start and after every fourth bit, and a count of the other stuff bits: its
-// length is fixed. A classic CRC is stuffed, so it is computed. An FD frame switches its bit rate
-// at the sample points of BRS and of the CRC delimiter. Here BRS counts as nominal and the
-// delimiter as data: the sum is exact if both sample points are equal parts of a bit. ESI counts as
-// sent by an error-active sender. Every count includes the 3 bits of intermission. Linear time.
+// has a stuff bit at its start and after every fourth bit, and a count of the other stuff bits, so
+// the length of the field is fixed. A classic CRC is stuffed, so it is computed. An FD frame
+// switches its bit rate at the sample points of BRS and of the CRC delimiter. BRS counts as
+// nominal, the delimiter as data. If both sample points are equal parts of a bit, the sum is exact.
+// ESI counts as sent by an error-active sender. Counts include 3 bits of intermission. Linear time.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ struct CanBits {
 };
 constexpr std::uint32_t total(CanBits bits) { return bits.nominal + bits.data; }
 
-// Bits per second. FD frames switch to the data rate; if it is 0, they do not switch.
+// Bits per second. If the data rate is 0, FD frames do not switch their rate.
 struct CanBitRate {
   std::uint32_t nominal;  // not 0
   std::uint32_t data;

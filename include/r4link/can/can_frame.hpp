@@ -10,7 +10,7 @@ constexpr std::uint8_t max_classic_size = 8;  // bytes of data in a classic fram
 constexpr std::uint8_t max_fd_size = 64;      // bytes of data in an FD frame
 constexpr std::uint32_t max_can_id = 0x7FF;   // 11 bits; the lower id wins the bus
 
-// Without initialisers, so that a CanFrame costs no time; `CanFrame frame{}` is all zero.
+// A CanFrame has no initialisers, so it costs no time. `CanFrame frame{}` is all zero.
 struct CanFrame {
   std::uint32_t id;   // 11 bits, or 29 if `extended`
   std::uint8_t size;  // bytes of data: 0–8, in an FD frame also 12, 16, 20, 24, 32, 48, 64
@@ -20,7 +20,7 @@ struct CanFrame {
   std::uint8_t data[max_fd_size];
 };
 
-// The smallest valid data size that holds `size` bytes; 64 if more than 64.
+// The smallest valid data size that holds `size` bytes. For more than 64 bytes: 64.
 constexpr std::uint8_t can_frame_size(std::uint32_t size) {
   return size <= 8    ? static_cast<std::uint8_t>(size)
          : size <= 12 ? 12

@@ -21,8 +21,8 @@ constexpr std::uint32_t can_nodes = 32;
 
 // `node` must be below can_nodes; higher bits are ignored.
 constexpr std::uint32_t emergency_stop_id = 0x010;
-// The number of a stop is in the 18 low bits of a 29-bit id, after 0x010. It must not be in the
-// data: two simultaneous stops with one id and different data would destroy each other for ever.
+// The number of a stop is in the 18 low bits of a 29-bit id, after 0x010. If the number were in the
+// data, simultaneous stops with one id and different data would destroy each other for ever.
 constexpr std::uint32_t short_stop_number(std::uint32_t number) { return number & 0x3FFFF; }
 constexpr std::uint32_t numbered_stop_id(std::uint32_t number) {
   return emergency_stop_id << 18 | short_stop_number(number);
@@ -31,7 +31,7 @@ constexpr std::uint32_t went_safe_id(std::uint32_t node) { return 0x020 | (node 
 constexpr std::uint32_t command_id(std::uint32_t node) { return 0x180 | (node % can_nodes); }
 constexpr std::uint32_t reply_id(std::uint32_t node) { return 0x200 | (node % can_nodes); }
 constexpr std::uint32_t telemetry_id(std::uint32_t node) { return 0x400 | (node % can_nodes); }
-// Not command_id(): a watcher's frame would destroy the simultaneous frames of a host.
+// Differs from command_id(), because a watcher's frame would destroy a host's simultaneous frames.
 constexpr std::uint32_t watch_id(std::uint32_t node) { return 0x600 | (node % can_nodes); }
 
 enum class CanIdKind : std::uint8_t {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The boards on a CAN bus, their datagrams and the bus load. Only listens, so it disturbs no host.
+// The boards, datagrams and load of a CAN bus. CanSurvey only listens, so it disturbs no host.
 //     CanSurvey survey({1000000, 0});
 //     survey.on_datagram([](std::uint8_t node, const Datagram& datagram) { … });
 //     survey.on_frame(frame, at_us);         // every frame of the bus, see CanListener
@@ -28,9 +28,9 @@ struct HeardNode {
   std::uint64_t states = 0;
   std::uint64_t heartbeats = 0;
   std::uint64_t answers = 0;             // N and I
-  std::uint64_t commands = 0;            // of its hosts, including heartbeats
+  std::uint64_t commands = 0;            // from the board's hosts, including heartbeats
   std::uint64_t damaged = 0;             // failed transfers and invalid datagrams
-  std::uint32_t lost = 0;                // packet numbers that did not come
+  std::uint32_t lost = 0;                // missing packet numbers
   std::uint64_t t_ms = 0;                // T of the newest datagram, the board's clock
   std::uint32_t pnum = 0;                // packet number of the newest datagram
   std::uint32_t heard_us = 0;            // arrival of the newest datagram, on_frame()'s clock
@@ -49,7 +49,7 @@ struct CanTraffic {
 
 class CanSurvey {
  public:
-  // All 29-bit ids count as this one.
+  // All 29-bit ids count as this id.
   static constexpr std::uint32_t extended_ids = max_can_id + 1;
 
   // If rate.data is 0, FD frames count as if they did not switch their rate.

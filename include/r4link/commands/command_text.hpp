@@ -64,7 +64,7 @@ R4LINK_API std::string describe(const Command& command);
 // Throws Error{usage} unless every path of `url` is a board's own cable. On other transports, other
 // programs would see the secret, and boards refuse it. `secret`: the name of the secret.
 R4LINK_API void require_cable(std::string_view url, std::string_view secret);
-// The same, if the command holds a secret. Board and AsyncBoard call it before they send.
+// If the command holds a secret, checks `url`. Board and AsyncBoard call this before they send.
 R4LINK_API void require_cable(std::string_view url, const Command& command);
 
 // The meaning of a board's refusal: "no such channel".

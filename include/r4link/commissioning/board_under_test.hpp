@@ -23,9 +23,9 @@ class R4LINK_API BoardUnderTest {
   using Duration = std::chrono::milliseconds;
 
   virtual void wait_heard() = 0;  // until the link is active or safe
-  // The next state in order, of at least the last ten seconds. Empty if no state comes in time.
+  // The next state in order, of at least the last ten seconds. Empty if no state arrives in time.
   virtual std::optional<ReceivedState> next_state(Duration timeout) = 0;
-  virtual void forget_states() = 0;  // drops the states that have come
+  virtual void forget_states() = 0;  // drops the states that have arrived
   virtual LinkStatus link() = 0;
 
   virtual BoardIdentity identify() = 0;
@@ -33,7 +33,7 @@ class R4LINK_API BoardUnderTest {
   virtual void give_wiring(const Wiring& wiring) = 0;
   virtual std::vector<std::uint8_t> scan() = 0;  // the addresses that answer on the user's I2C bus
 
-  // Throws if the board does not confirm it within `timeout`.
+  // Throws if the board does not confirm the command within `timeout`.
   virtual void send(const Command& command, Duration timeout) = 0;
   virtual void arm() = 0;  // closes relay 1
   virtual void stop() = 0;

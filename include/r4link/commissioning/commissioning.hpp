@@ -46,15 +46,15 @@ R4LINK_API const Check& check_named(std::string_view id);
 
 class R4LINK_API Commissioning {
  public:
-  // Continues `begun`. If it is a report of another board, run() throws Error{usage}. `board` and
-  // `person` must outlive the Commissioning.
+  // Continues `begun`. If `begun` is a report of another board, run() throws Error{usage}. `board`
+  // and `person` must outlive the Commissioning.
   Commissioning(BoardUnderTest& board, Person& person, Report begun = {});
 
   // Does a check, also a second time, and puts the result into the report. If the link is lost,
   // throws Error: the report is kept, and the board must be opened again.
   enum class End : std::uint8_t { done, left };
   End run(std::string_view id);
-  // Does all checks that are neither passed nor found; or the checks in `only`, done or not.
+  // Does all checks that are neither passed nor found, or the checks in `only` in any case.
   End run_all(const std::vector<std::string>& only = {});
   // Asks whether the board may keep the learnt wiring and settings, sends and verifies them.
   End offer();

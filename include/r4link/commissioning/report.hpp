@@ -42,7 +42,7 @@ struct Learnt {
     serves,      // the places of `signal` belong to the thing of `other`
     option,      // the option of `signal` has the other value
     place,       // `signal` is at `place`
-    full_scale,  // of the analog input `signal`: `factor` times the present one
+    full_scale,  // the full scale of input `signal` becomes `factor` times the present full scale
   };
   What what = What::serves;
   int signal = 0;  // index in Wiring; for a thing with several signals, the first

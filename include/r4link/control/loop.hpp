@@ -18,7 +18,7 @@
 //     standstill   a motor is driven, but its encoder does not move
 //     asked        the step returns no setpoints
 //
-// and then sets the outputs to `rest`, confirmed by the board. It does not restart automatically.
+// and then sets the outputs to `rest`, confirmed by the board. The loop does not restart by itself.
 #pragma once
 
 #include <chrono>
@@ -84,14 +84,14 @@ class R4LINK_API LoopGuard {
   explicit LoopGuard(LoopOptions options);
 
   void start(Clock::time_point now);
-  // Call it for each state. If a step is due, returns the seconds since the last step.
+  // Call on_state() for each state. If a step is due, returns the seconds since the last step.
   std::optional<double> on_state(const ReceivedState& state, DisarmCause disarmed,
                                  Clock::time_point now);
-  // Call it with the commands of each step. A motor without a command keeps its last command.
+  // Call on_commanded() with each step's commands. Other motors keep their last commands.
   void on_commanded(const Setpoints& setpoints);
-  // Call it at deadline(), and when the link or the arming changes. LoopEnd::none: continue.
+  // Call check() at deadline(), and when the link or the arming changes. LoopEnd::none: continue.
   LoopEnd check(HostLinkState link, DisarmCause disarmed, Clock::time_point now);
-  // When the loop ends as late, unless a state comes before.
+  // If no state arrives before this time, the loop ends as late.
   Clock::time_point deadline() const { return deadline_; }
   void end(LoopEnd cause, std::string why);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::control::Odometry: the pose of a robot from the motion of its wheels, and its uncertainty.
-// Each step is an arc of a circle with independent errors in length and angle. Their variances grow
+// Each step is an arc of a circle with independent errors in length and angle. The variances grow
 // with the length and the angle, so the model also fits steered robots. The covariance grows by
 // first-order propagation (Siegwart et al., Introduction to Autonomous Mobile Robots, 2nd ed.,
 // 5.2.4). Metres and radians; x forward, y and positive angles to the left (REP 103).

@@ -36,8 +36,8 @@ class R4LINK_API Pid {
   // a rate that is not above 0, and for a negative filter.
   explicit Pid(const PidOptions& options);
 
-  // The output, `dt_s` seconds after the last step; unchanged if dt_s is not above 0. Throws
-  // Error{data} for a value that is not finite.
+  // The output, `dt_s` seconds after the last step. If dt_s is not above 0, the output is
+  // unchanged. Throws Error{data} for a value that is not finite.
   double step(double setpoint, double measured, double dt_s);
   double output() const { return output_; }
   // The integral term, in units of the output.

@@ -30,7 +30,7 @@ class R4LINK_API Wheel {
 
   // The distance in m since the previous state, from ENCn; 0 in the first call.
   double advance(const State& state);
-  // The speed from the counts of the last window, so half a window old. Needs ENCn in each state.
+  // The speed over the last window, so it is half a window old. Needs ENCn in each state.
   double speed_m_s() const { return speed_m_s_; }
   // The speed from ENCnHZ: updated ten times a second, 50 to 150 ms old. Needs only this state.
   double measured_m_s(const State& state) const;

@@ -26,7 +26,7 @@
 namespace r4 {
 
 struct DeviceReading {
-  // In the unit of the value; empty before the first reading, and if it is not a measurement.
+  // The value in its unit. Empty: no reading yet, or the value is not a measurement.
   std::optional<double> number;
   std::uint32_t t_ms = 0;    // the board's clock at the reading
   std::uint32_t errors = 0;  // failed readings since the setup
@@ -59,8 +59,8 @@ class R4LINK_API Device {
 
   // The field that carries a value. `value`: index in description().values.
   StateField field(std::size_t value) const;
-  // True if the device is set up (DeviceDescription::ready). False if it was reset or never set up:
-  // its values are not measurements, so attach it again. Empty: not known.
+  // True if the device is set up (DeviceDescription::ready). False if the device was reset or never
+  // set up: attach it again, because its values are not measurements. Empty: not known.
   std::optional<bool> is_set_up(const State& state) const;
   // True if DeviceValue::only is true, and the device is set up or cannot report its set-up.
   bool counts(const State& state, std::size_t value) const;

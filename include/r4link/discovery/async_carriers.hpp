@@ -13,8 +13,8 @@
 
 namespace r4 {
 
-// The host's carrier for a URL, not yet opened. Throws Error{usage}. A watcher uses any free UDP
-// port, unless the URL names a port: port 2390 is for controlling hosts.
+// The host's carrier for a URL, not yet opened. Throws Error{usage}. Unless the URL names a port, a
+// watcher uses any free UDP port, because port 2390 is for controlling hosts.
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
                                            BoardRole role);
 
@@ -25,9 +25,9 @@ std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
                                                          const std::vector<std::string>& urls,
                                                          BoardRole role);
 
-// A host's carrier that is not shared with other programs of this computer, not yet opened. It
-// works while another program holds the transport and hangs: on any free UDP port, or on a bus
-// beside that program. Only one program can use a serial port. Throws Error{usage}.
+// A host's carrier that is not shared with other programs of this computer, not yet opened. The
+// carrier works while another program holds the transport and hangs: on any free UDP port, or on a
+// bus beside that program. Only one program can use a serial port. Throws Error{usage}.
 std::unique_ptr<Carrier> make_own_carrier(asio::io_context& io, std::string_view url);
 
 }  // namespace r4

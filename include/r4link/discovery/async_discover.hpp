@@ -38,8 +38,8 @@ class DiscoveryThread final : public asio::execution_context::service {
 
 // void(std::exception_ptr, Discovery). Searches as discover() does, on a separate thread, one
 // search at a time for each io_context. The handler runs on its associated executor, else on
-// `executor`, and receives errors of discover(). A search cannot be cancelled: the destructor of
-// the io_context waits for it, 1.3 s at most.
+// `executor`, and receives errors of discover(). A search cannot be cancelled, so the destructor of
+// the io_context waits for the search, 1.3 s at most.
 template <class Token>
 auto async_discover(const asio::io_context::executor_type& executor, DiscoveryOptions options,
                     Token&& token) {

@@ -7,9 +7,9 @@
 // The transports are searched at the same time. Blocks for up to 1.3 s. In a control loop or the
 // loop of an AsyncBoard, use async_discover().
 //   serial  A port with the USB id of a board (2341:0266, Arduino Giga R1), and each port of
-//           `serial_ports`, is opened as by a watcher. The board there is asked for its identity
-//           (Q:ID), at most three times. A program that opens the port meanwhile gets it. If a
-//           program of this computer holds the port, the search only listens beside it.
+//           `serial_ports`, is opened as by a watcher. The search requests the board's identity
+//           (Q:ID), at most three times. A program that opens the port meanwhile gets the port. If
+//           a program of this computer holds the port, the search only listens beside it.
 //   CAN     The search listens on each interface that is up for 0.7 s. A board that is not
 //           controlled gets Q:ID, at most three times. Nothing is sent to a board that a host
 //           controls: the search receives the answer to the host's question within 1.3 s.

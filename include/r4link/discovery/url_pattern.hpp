@@ -3,15 +3,15 @@
 //     can://can0?node=0-7                      udp://127.0.0.1:20000-20999
 //     udp://10.0.0.{1-250}                     udp://arm-{1,3,07-12}
 //
-// A range of nodes or of ports needs no braces. With several braces, the last one counts fastest. A
-// number that begins with 0 keeps its width: {07-12} is 07, 08 …
+// A range of nodes or of ports needs no braces. With several braces, the last number counts
+// fastest. A number that begins with 0 keeps its width: {07-12} is 07, 08 …
 //
 // One text also joins several paths to one board (docs/how-to/redundancy.md):
 //     serial:auto+udp://192.168.0.125          can://can0?node=0-7+can://can1?node=0-7
 //
 // A '+' joins only before the scheme of a URL and its colon. Elsewhere '+' is an ordinary
-// character, and %2B always is. All patterns of a text must stand for the same number of URLs: the
-// first board has the first URL of each, and so on. A part without a pattern names one board.
+// character, and %2B always is. All patterns of a text must stand for the same number of URLs.
+// Board n has URL n of each pattern. Without a pattern, a part names one board.
 #pragma once
 
 #include <cstddef>

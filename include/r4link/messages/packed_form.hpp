@@ -11,10 +11,10 @@
 // Stateless and lossless: unpack() returns exactly the bytes that pack() was given. A datagram that
 // cannot be packed or would not become shorter is sent plain. A plain datagram starts with a byte
 // below 0x80, so every reader accepts both forms. No heap; about 600 bytes of stack; linear in the
-// size. Neither function checks the checksum: read_datagram() does. A damaged packed form is
-// refused, or unpacks to the same bytes (superfluous digits) or to other valid bytes. Their
-// checksum is right once in 2^32. CRC-32's guarantee for a few wrong bits is lost, because one
-// wrong bit may become several bytes. The frame's CRC-15 protects the bits on the bus.
+// size. Neither function checks the checksum, because read_datagram() does. A damaged packed form
+// is refused, or unpacks to the same bytes (superfluous digits) or to other valid bytes. The
+// checksum of other bytes is right once in 2^32. CRC-32's guarantee for a few wrong bits is lost,
+// because one wrong bit may become several bytes. The frame's CRC-15 protects the bits on the bus.
 #pragma once
 
 #include <cstddef>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Distinguishes lost, duplicate, reordered and restarted packet numbers (paper section 4.1: PNum).
 // Packet numbers are unsigned, 32 bit, and wrap (RFC 1982). The tracker remembers the last 64
-// numbers. A late packet is subtracted from the lost packets. A number further back is old. If its
-// successor comes next, the sender has restarted (RFC 3550 A.1).
+// numbers. A late packet is subtracted from the lost packets. A number further back is old. If the
+// successor of an old number arrives next, the sender has restarted (RFC 3550 A.1).
 #pragma once
 
 #include <cstdint>

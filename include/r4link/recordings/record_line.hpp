@@ -64,19 +64,19 @@ struct RecordLine {
   std::string text;
 };
 
-// Reads a line without its end. False if it is damaged.
+// Reads a line without its end. False if the line is damaged.
 R4LINK_API bool read_record_line(std::string_view line, RecordLine& out);
 
 // --- bytes and times, as a line has them
 
 // Appends bytes; writes a backslash and a byte that is not printable ASCII as \xNN.
 R4LINK_API void append_escaped(std::string& out, std::string_view bytes);
-// The reverse. False if the text has another form.
+// The inverse of append_escaped(). False if the text has another form.
 R4LINK_API bool append_unescaped(std::string& out, std::string_view text);
 
 // "2026-11-23T21:11:33.404765Z"
 R4LINK_API std::string record_time_text(Time time);
-// The reverse, also for fewer decimals and without the Z. Empty if invalid.
+// The inverse of record_time_text(), also for fewer decimals and without the Z. Empty if invalid.
 R4LINK_API std::optional<Time> read_record_time(std::string_view text);
 
 }  // namespace r4

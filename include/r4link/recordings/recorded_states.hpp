@@ -18,7 +18,7 @@ class R4LINK_API RecordedStates {
   const State* take(const Record& record);
   // The datagram of the last take(). Valid as long as the record.
   const Datagram& datagram() const { return datagram_; }
-  // Call it in on_header(): path numbers may have another meaning.
+  // Call clear() in on_header(), because path numbers may have another meaning.
   void clear() { states_.clear(); }
 
  private:

@@ -21,12 +21,12 @@ namespace r4 {
 
 // Reads the lines of the native format, in a file of any format. Successive recordings in one file,
 // each after its header, are accepted. Mixed recordings, as from `sort -m`, `mergecap` and `mcap
-// merge`, are refused: a path number means another board in each. The signs of a mixture are
+// merge`, are refused, because their path numbers mean different boards. Signs of a mixture are
 // - a header that follows a header, or a record that follows the end of the recording,
 // - a path whose URL changes without a header,
 // - lines, or datagrams of one path, from another stream (an interface of a capture, a channel of
 //   MCAP) without a new header or path.
-// Damage may explain such a sign: then reading continues, and the visitor gets damage_line.
+// If damage may explain a sign, reading continues, and the visitor gets damage_line.
 class R4LINK_API RecordingLines {
  public:
   static constexpr std::string_view damage_line = "# damage: a part before this could not be read";
@@ -42,7 +42,7 @@ class R4LINK_API RecordingLines {
   // the board's URL in the stream; may be empty. Throws Error{data} for mixed recordings.
   void on_record(const Record& record, std::uint32_t stream, std::string_view url);
 
-  // A sign of a mixture. Throws Error{data}, unless damage may explain it.
+  // A sign of a mixture. Throws Error{data} unless damage may explain the sign.
   void on_sign_of_mixture();
   // A part of the file could not be read here.
   void on_damage() {
@@ -78,7 +78,7 @@ class R4LINK_API RecordingReader {
   // Reads the next bytes. Lines may end in CR LF, and the UTF-8 mark may precede the first line.
   // Throws Error{data} for a later version of the format, mixed recordings, and other files.
   void feed(std::string_view bytes);
-  // The file has ended. Throws Error{data} if it was not a recording.
+  // The file has ended. Throws Error{data} if the file was not a recording.
   void finish();
 
  private:
@@ -101,7 +101,7 @@ class R4LINK_API RecordingReader {
   std::uint64_t taken_ = 0;      // bytes of the file so far
   std::uint64_t line_ = 1;       // the number of the next line
   std::uint64_t offset_ = 0;     // offset of the next line in the text
-  std::string part_;             // the beginning of a line whose end has not come
+  std::string part_;             // the beginning of a line whose end has not arrived
   std::uint64_t part_size_ = 0;  // size of this line; larger than part_ if too long
 };
 

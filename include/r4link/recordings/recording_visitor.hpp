@@ -29,18 +29,18 @@ R4LINK_API std::string to_text(const RecordingDamage& damage);
 class RecordingVisitor {
  public:
   virtual ~RecordingVisitor() = default;
-  // A datagram, also a damaged one, or an event. The path may lack a path line.
+  // A datagram, also a damaged datagram, or an event. The path may lack a path line.
   virtual void on_record(const Record& record) = 0;
   // Reading continues after the damage.
   virtual void on_damage(const RecordingDamage& damage) = 0;
   // Usually called before the first record of the path (not in a damaged or foreign file), and
   // again when the path's name is known. After a new header a path number may mean another path.
   virtual void on_path(const RecordedPath& path) { static_cast<void>(path); }
-  // A device in a slot of a path. It applies until the next header. Device::parse() reads it.
+  // A device in a slot of a path, until the next header. Device::parse() reads the device.
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   // A recording begins or continues here: one file may hold several.
   virtual void on_header() {}
-  // Any # line except path lines; header and device lines come after on_header() and on_device().
+  // Any # line except path lines; header and device lines follow on_header() and on_device().
   virtual void on_comment(std::string_view line) { static_cast<void>(line); }
 };
 

@@ -17,8 +17,8 @@ namespace r4 {
 class R4LINK_API ZstdWriter {
  public:
   ZstdWriter();
-  // Appends the compressed `bytes` to `out`, so that a reader can read all of them. `end_frame`
-  // ends the frame, so that later bytes can be read without these bytes.
+  // Appends the compressed `bytes` to `out`, so that a reader can read all bytes. `end_frame` ends
+  // the frame, so that later bytes can be read without these bytes.
   void write(std::string_view bytes, bool end_frame, std::string& out);
 
  private:

@@ -122,7 +122,7 @@ constexpr FieldKind shown_by(CommandKind command) {
   }
 }
 
-// `channel`: from 1. StateField::count if there is no such channel.
+// `channel`: from 1. If there is no such channel: StateField::count.
 R4LINK_API StateField state_field(FieldKind kind, int channel);
 
 // The numbers of a field, in the order and units of its kind. For FieldForm::reading, answer and

@@ -6,7 +6,7 @@
 //     r4::Board other(r4::carrier_on(bus, {.node = 3}));
 //
 // open(), send() and close() are called on a separate thread, so they may wait while the link
-// continues. A datagram that waits for 100 ms is dropped, unless it is a stop.
+// continues. A datagram that waits for 100 ms is dropped, except a stop.
 //
 // If a function throws a std::exception, the transport is down: an event reports it, close() is
 // called, and then open() five times a second until it succeeds. Opening a board waits for the
@@ -27,8 +27,8 @@ namespace r4 {
 // Moves whole datagrams of at most max_datagram (1024) bytes with any content.
 class R4LINK_API OwnTransport {
  public:
-  // Call it for each received datagram, on any thread and at any time. Never waits. No effect after
-  // the next open() or the end of the link. Throws Error{usage} for more than max_datagram bytes.
+  // Call Received for each received datagram, on any thread and at any time. Never waits. No effect
+  // after the next open() or the link's end. Throws Error{usage} above max_datagram bytes.
   using Received = std::function<void(std::string_view datagram)>;
 
   virtual ~OwnTransport() = default;
@@ -42,8 +42,8 @@ class R4LINK_API OwnTransport {
 // A CAN bus that the system does not offer. The link uses it as can:// (docs/reference/can.md).
 class R4LINK_API OwnCanBus {
  public:
-  // Call it for each received frame, as OwnTransport::Received, but not for remote frames and own
-  // frames. Throws Error{usage} for more than 8 bytes of data, or 64 with CAN FD.
+  // Call Received for each received frame, as OwnTransport::Received, but not for remote frames and
+  // own frames. Throws Error{usage} for more than 8 bytes of data, or 64 with CAN FD.
   using Received =
       std::function<void(std::uint32_t id, bool extended, bool fd, std::string_view data)>;
 
@@ -60,7 +60,7 @@ struct OwnCanNode {
   bool pack = true;  // sends and receives the packed form; false: text
 };
 
-// One transport or bus serves one board at a time. Neither call blocks.
+// One transport or bus serves one board at a time. carrier_on() does not block.
 R4LINK_API CarrierMaker carrier_on(std::shared_ptr<OwnTransport> transport);
 // Throws Error{usage} for a node outside 0-31.
 R4LINK_API CarrierMaker carrier_on(std::shared_ptr<OwnCanBus> bus, const OwnCanNode& node = {});

@@ -21,12 +21,12 @@ namespace r4 {
 
 // `signal`: an index in Wiring, 0 to signal_count - 1. Such as "stepper 1 direction", "handle".
 R4LINK_API std::string signal_name(int signal);
-// The inverse; throws Error{data}.
+// The inverse of signal_name(). Throws Error{data}.
 R4LINK_API int signal_named(std::string_view name);
 
 // "D34 inverted", "A0", "osmc.1", "GPB7", "VOUTA", "0x40", "SDA1/SCL1", "none".
 R4LINK_API std::string place_name(int signal, Place place);
-// The inverse; throws Error{data} if the signal cannot have such a place.
+// The inverse of place_name(). Throws Error{data} if the signal cannot have such a place.
 R4LINK_API Place place_named(int signal, std::string_view name);
 
 // The fault of a wiring in words. `found` is the result of check(), and not WiringFault::none.

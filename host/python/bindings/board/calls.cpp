@@ -38,7 +38,7 @@ class Call {
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
 
-  // Call it on the loop, or before the call is posted. `end` returns the value, or throws.
+  // Call end_with() on the loop, or before the call is posted. `end` returns the value, or throws.
   template <class End>
   void end_with(End end) {
     try {
@@ -60,7 +60,7 @@ class Call {
           [self](AsyncBoard&) { self->cancelled_.emit(asio::cancellation_type::terminal); });
     });
   }
-  // Call it only after the end.
+  // Call result() only after the end.
   py::object result() const {
     if (error_) std::rethrow_exception(error_);
     if (const auto* identity = std::get_if<BoardIdentity>(&value_)) return py::cast(*identity);

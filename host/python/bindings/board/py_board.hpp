@@ -39,7 +39,7 @@ class PyBoard {
 
   Board* operator->() { return &board_->get(); }
 
-  // Call it without the GIL.
+  // Call close() without the GIL.
   void close() {
     board_->if_here([this](Board& board) {
       board.close();
