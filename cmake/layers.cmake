@@ -2,10 +2,9 @@
 # r4_portable_layer(NAME FILES...) and r4_host_layer(NAME FILES...) build a layer as an OBJECT library.
 # cmake/library.cmake joins the objects of all layers into the library.
 
-# Asio without Boost, compiled once (transports/asio.cpp). Headers that come before Asio decide
-# whether Asio detects std::aligned_alloc, so object files could differ in how they free handler
-# memory. The last definition switches the detection off. A program that links r4link::asio needs
-# all of these definitions.
+# Asio without Boost, compiled once (transports/asio.cpp). Headers that come before Asio decide whether Asio detects
+# std::aligned_alloc, so object files could differ in how they free handler memory. The last definition switches the
+# detection off. A program that links r4link::asio needs all these definitions.
 set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPRECATED
     ASIO_DISABLE_STD_ALIGNED_ALLOC)
 

@@ -3,7 +3,7 @@
 #   r4link::r4link   libr4link.a: include/r4link without async_*.hpp. Only symbols with R4LINK_API are global. The
 #                    library's Asio is local, so it does not conflict with an Asio of the program.
 #   r4link::shared   libr4link.so: the same as a shared library
-#   r4link::asio     libr4link-asio.a: also AsyncBoard and async_discover(). It uses the program's Asio.
+#   r4link::asio     libr4link-asio.a: also AsyncBoard and async_discover(). This form uses the program's Asio.
 #
 # A program links one of these libraries, by find_package(r4link), or by pkg-config r4link and r4link-asio.
 include(CMakePackageConfigHelpers)

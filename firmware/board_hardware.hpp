@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The R4 board's chip drivers, wired by a Wiring. A signal without a place or chip has no effect.
 //
-// Power-up: call power_up() first. It resets the PWM chips, which turns every PWM output off in any
-// mode, and makes every output safe. poll() then sets the chips up, and ready() is true when all
-// are set up. Outputs applied earlier wait until then: no motor runs before its brake works.
+// Power-up: call power_up() first. power_up() resets the PWM chips, which turns every PWM output
+// off in any mode, and makes every output safe. poll() then sets the chips up. ready() is true when
+// all chips are set up. Outputs applied earlier wait: no motor runs before its brake works.
 //
 // Safe state (make_safe()): steppers stopped, PWM outputs off, DAC codes and outputs 0, brakes on,
 // relays off. make_safe() may be called at any time, also in an interrupt or a fault handler during
-// a transfer. It makes at most two bounded attempts (a held bus is recovered once).
+// a transfer. A call makes at most two bounded attempts (a held bus is recovered once).
 //
 // Chip faults: the fault is latched with chip and reason, all outputs are made safe, and apply()
 // has no effect until clear_fault(). Every retry_us the bus is recovered and the chip set up again,
@@ -58,7 +58,7 @@ class BoardHardware final : public Hal {
  public:
   struct Config {
     Wiring wiring = plan_wiring();  // has no fault
-    // not_confirmed: a fault that clear_fault() ends; damaged, other_bus: until the next start.
+    // not_confirmed: a fault that clear_fault() ends; damaged, other_bus: a fault until a restart.
     ChipTrouble wiring_trouble = ChipTrouble::none;
     std::int32_t tick_hz = step_tick_hz;
     AnalogCalibration calibration[analog_channels];
@@ -96,7 +96,7 @@ class BoardHardware final : public Hal {
   void step_tick() {
     for (Stepper& stepper : steppers_) stepper.tick();
   }
-  // True if a stepper moves. If not, the ticks may pause.
+  // True if a stepper moves. If no stepper moves, the ticks may pause.
   bool stepping() const;
   QuadratureEncoder& encoder(int channel) { return encoders_[channel - 1]; }
   UltrasonicSensors& ultrasonic() { return ultrasonic_; }
@@ -153,7 +153,7 @@ class BoardHardware final : public Hal {
   bool handle_seen_ = false;           // the pin read held at the last poll
   bool handle_held_ = false;           // the pin has read held for handle_settle_us
   volatile bool busy_ = false;         // the bus is in use: in poll(), apply() or make_safe()
-  volatile bool interrupted_ = false;  // make_safe() interrupted that use
+  volatile bool interrupted_ = false;  // make_safe() interrupted a use of the bus
 };
 
 }  // namespace firmware

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Chooses the I2C bus with the board's chips: the bus of the wiring, unless a PCA9685 answers only
-// on the other bus. Then the board drives the chips on that bus, to keep them off, and stays in a
-// fault. A board without a PCA9685 leaves the other bus to the user.
+// Chooses the I2C bus with the board's chips. If a PCA9685 answers only on the other bus, the board
+// drives the chips on that bus, to keep the chips off, and stays in a fault. Otherwise the bus of
+// the wiring is chosen. A board without a PCA9685 leaves the other bus to the user.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct BusChoice {
   bool user_may;               // false: transfers of the user could reach the chips
 };
 
-// `answers`: bit n: a PCA9685 answers on bus n. `trouble`: of the wiring, before this choice.
+// `answers`: bit n: a PCA9685 answers on bus n. `trouble`: the wiring's trouble before this choice.
 inline BusChoice choose_bus(const Wiring& wiring, unsigned answers, ChipTrouble trouble) {
   const int named = wiring.at(SignalKind::chip_bus).number();
   const bool is_lost = trouble == ChipTrouble::damaged;

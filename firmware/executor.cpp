@@ -8,7 +8,7 @@ namespace firmware {
 
 namespace {
 
-constexpr int supply_relay = 1;  // of the motors (docs/reference/safety.md)
+constexpr int supply_relay = 1;  // for the motors' supply (docs/reference/safety.md)
 
 void set_relay(std::uint8_t& relays, int channel, bool on) {
   const unsigned bit = 1U << static_cast<unsigned>(channel - 1);

@@ -10,8 +10,8 @@
 //                                                                  again after each clear, because
 //                                                                  that duty would be unwatched
 //
-// A duty is work that must repeat: a turn of the loop, of a thread, of another interrupt. It checks
-// in each time, in any thread. tick() runs in an interrupt, on the core that it interrupts.
+// A duty is work that must repeat: a turn of the loop, of a thread, of another interrupt. A duty
+// checks in each time, in any thread. tick() runs in an interrupt, on the core that it interrupts.
 #pragma once
 
 #include <atomic>
@@ -37,7 +37,7 @@ class Guard {
     if (duty < max_duties) duties_[duty].seen.store(true, std::memory_order_relaxed);
   }
 
-  // The outputs become safe at `deadline_ms`, unless arm() moves the deadline or disarm() ends it.
+  // If neither arm() moves the deadline nor disarm() ends it, outputs become safe at `deadline_ms`.
   void arm(std::uint32_t deadline_ms);
   void disarm() { armed_.store(false, std::memory_order_relaxed); }
 

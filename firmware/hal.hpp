@@ -49,9 +49,9 @@ struct Inputs {
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};     // 0: no echo
   std::uint8_t ultrasonic_blind = 0;                         // bit n-1: sensor n does not answer
   std::uint8_t gpio = 0;                                     // bit n-1: input n is high
-  // True if the dead-man's handle is held, or if the board has none.
+  // True if the dead-man's handle is held, or if the board has no handle.
   bool handle_held() const { return handle != Handle::released; }
-  ChipFault fault;  // the first since the last clear_fault()
+  ChipFault fault;  // the first fault since the last clear_fault()
 };
 
 class Hal {

@@ -2,7 +2,7 @@
 // Why the outputs are safe: causes, each latched until its own end (docs/reference/safety.md).
 //     cause      enters                                   leaves                      setpoints
 //     link       host silent, or its transport failed     the host reconnects         kept
-//     handle     dead-man's handle released               it is held again            cleared
+//     handle     dead-man's handle released               handle held again            cleared
 //     proximity  obstacle nearer than a threshold, or     5 cm beyond it for 500 ms,  cleared
 //                a sensor with a threshold is blind       or threshold off
 //     stop       E:STOP                                   E:CLEAR                     cleared
@@ -11,7 +11,7 @@
 //
 // The outputs are safe while there is a cause. The board reports the gravest cause: stop, fault,
 // watchdog, handle, proximity, link. E:CLEAR ends only the reported cause, which the host has seen.
-// It names the number of the newest cause, so that no host clears a later cause.
+// E:CLEAR names the number of the newest cause, so that no host clears a later cause.
 #pragma once
 
 #include <cstdint>

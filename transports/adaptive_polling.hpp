@@ -25,7 +25,7 @@ class AdaptivePolling {
     if (silent_) last_[index()] = now - since_;
     silent_ = false;
   }
-  // Call it when all arrived frames are taken.
+  // Call when all arrived frames are taken.
   void on_silence(Silence kind, Time now) {
     if (silent_ && kind == kind_) return;
     silent_ = true;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Functions that only boards use. They do nothing for a carrier that is not a BoardEnd.
+// Functions that only boards use. For other carriers these functions do nothing.
 #pragma once
 
 #include "r4link/carrier.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// File descriptors, and sockets of Asio that a child does not inherit: it would keep the port open.
+// File descriptors, and sockets of Asio that no child inherits: a child would keep the port open.
 #pragma once
 
 #include <fcntl.h>

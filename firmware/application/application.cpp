@@ -118,7 +118,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
 void Application::turn(std::uint32_t now_ms) {
   if (now_ms - turned_ms_ > standstill_ms) {
     for (PortSlot& slot : ports_) {
-      if (!slot.behind) slot.waiting_ms = turned_ms_;  // otherwise earlier datagrams may wait
+      if (!slot.behind) slot.waiting_ms = turned_ms_;  // else the time of earlier datagrams stays
       slot.behind = true;
     }
     any_behind_ = true;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4). It owns
-// no thread, clock or socket. The port calls receive() for each datagram, poll() as time passes,
-// port_down() when a transport fails, and guard().tick() in a timer interrupt. Setpoints reach the
-// hardware only in update_outputs(); Safety holds every cause of the safe state.
+// The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4). The
+// application owns no thread, clock or socket. The port calls receive() for each datagram, poll()
+// as time passes, port_down() when a transport fails, and guard().tick() in a timer interrupt.
+// Setpoints reach the hardware only in update_outputs(). Safety holds all causes of the safe state.
 //     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
 //     ACTIVE       a host is in control and there is no cause: outputs follow the setpoints
 //     SAFE         there is a cause (safety.hpp): outputs safe; with cause `link` heartbeats only
 //
-// A session has one to four paths (session_paths.hpp); each path gets states and heartbeats. Packet
-// numbers count per port; answers to hosts not in control have their own. Times are ms, and wrap.
+// A session has one to four paths (session_paths.hpp). Each path gets states and heartbeats. Packet
+// numbers count per port. Answers to other hosts have separate numbers. Times are ms, and wrap.
 #pragma once
 
 #include <cstddef>
@@ -38,10 +38,10 @@ class Application {
   struct Config {
     Identity identity;  // the texts must outlive the application
     Settings settings;
-    // Authentication::chance_size random bytes, different at each boot. Without them, a board with
-    // a key obeys only a host on the board's own cable.
+    // Authentication::chance_size random bytes, different at each boot. Without chance, a board
+    // with a key obeys only a host on the board's own cable.
     const std::uint8_t* chance = nullptr;
-    // Must outlive the application. All UARTs or none. Commands for nullptr are refused as unknown.
+    // Must outlive the application. nullptr: commands are refused as unknown. All UARTs or none.
     UserI2c* i2c = nullptr;
     UserUart* uarts[uart_channels] = {};
   };
@@ -50,13 +50,13 @@ class Application {
 
   Application(Hal& hal, const Config& config, Observer* observer = nullptr);
 
-  // Call before start(). Returns the port's number, or no_port beyond max_ports ports: not served.
+  // Call before start(). Returns the port's number. Beyond max_ports: no_port, not served.
   std::uint8_t add_port(Port& port);
   // Makes the outputs safe and sends the first heartbeat.
   void start(std::uint32_t now_ms);
 
   // Ignores a port that was not added. After a pause longer than standstill_ms, datagrams may have
-  // waited: heartbeats count from the last turn of the loop, until drained() or after catch_up_ms.
+  // waited. So until drained(), or for catch_up_ms, heartbeats count from the last loop turn.
   void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
   // All datagrams that arrived on `port` were handed over, so its next heartbeat has not waited.
   void drained(std::uint8_t port);
@@ -69,7 +69,7 @@ class Application {
   // Part of poll(). Call at least once per millisecond: each call can begin one transfer.
   void poll_devices(std::uint32_t now_ms);
 
-  // For the timer interrupt. poll() checks in the first duty, loop_duty.
+  // Call tick() in the timer interrupt. poll() checks in the first duty, loop_duty.
   Guard& guard() { return guard_; }
   static constexpr Guard::Duty loop_duty = 0;
 
@@ -84,7 +84,7 @@ class Application {
 
   static constexpr std::uint32_t interlock_period_ms = 10;
   static constexpr std::uint32_t loop_limit_ms = 20;
-  // A longer pause between two turns is a standstill. A heartbeat may count as this much newer.
+  // A longer pause between two turns is a standstill. A heartbeat may count as newer by this time.
   static constexpr std::uint32_t standstill_ms = 15;
   // A port holds at most as many datagrams as the loop reads in this time.
   static constexpr std::uint32_t catch_up_ms = 50;
@@ -92,14 +92,14 @@ class Application {
   // time is two turns of each sensor (drivers/ultrasonic.hpp), because one turn may miss an echo.
   static constexpr int proximity_hysteresis_cm = 5;
   static constexpr std::uint32_t proximity_clear_ms = 500;
-  // States show the answer to a single transfer on the user's bus for this long, even unselected.
+  // For this time, states show the answer to a single transfer on the user's bus, selected or not.
   static constexpr std::uint32_t answer_shown_ms = 1000;
 
  private:
   struct PortSlot {
     Port* port = nullptr;
-    std::uint32_t next_pnum = 0;   // of states, heartbeats and answers to the controlling host
-    std::uint32_t aside_pnum = 0;  // of answers to other hosts
+    std::uint32_t next_pnum = 0;   // numbers states, heartbeats, answers to the controlling host
+    std::uint32_t aside_pnum = 0;  // numbers answers to other hosts
     bool behind = false;           // datagrams may have waited, since `waiting_ms`
     std::uint32_t waiting_ms = 0;
   };
@@ -182,7 +182,7 @@ class Application {
   SessionPaths paths_;
   Watchers watchers_;
   Authentication authentication_;
-  AnswerBudget questions_;  // of hosts that are not in control
+  AnswerBudget questions_;  // limits answers to hosts that are not in control
   Guard guard_;
   Safety safety_;
   StateSchedule schedule_;
@@ -198,7 +198,7 @@ class Application {
   std::uint32_t went_on_ms_ = 0;   // the first turn after a standstill
   std::uint32_t obstacle_ms_ = 0;  // when an obstacle was last seen
   std::uint32_t caused_ms_ = 0;    // when a cause other than link last began
-  // Of the datagram being read: its host, and whether another path delivered it before.
+  // The host of the datagram being read, and whether another path delivered the datagram before.
   HostId speaker_;
   bool known_ = false;
   bool outputs_live_ = false;  // outputs_ follow the setpoints
@@ -212,8 +212,8 @@ class Application {
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;
   std::uint32_t answered_ms_ = 0;
-  bool has_answer_ = false;      // shown in states
-  std::uint32_t wiring_in_use_;  // its checksum
+  bool has_answer_ = false;      // states show an answer
+  std::uint32_t wiring_in_use_;  // checksum of the wiring
   UserI2c* i2c_;
   UserUart* uarts_[uart_channels];
   std::uint32_t rx_ok_ = 0;

@@ -16,8 +16,8 @@ void Application::look_at_time(std::uint32_t now_ms) {
   if (lost) enter(SafeReason::link, now_ms);
 }
 
-// A stop that an interrupt has received applies at once. Its datagram shows later whether it is a
-// repetition. If a port had no room for the datagram, the stop counts as a new cause.
+// A stop that an interrupt has received applies at once. Its datagram shows later whether the stop
+// is a repetition. If a port had no room for the datagram, the stop counts as a new cause.
 void Application::look_at_stops(std::uint32_t now_ms) {
   const std::uint32_t heard = guard_.stops_heard();
   if (heard != stops_heard_) {
@@ -56,7 +56,7 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
 // datagrams are not delayed for longer. Without a latched cause, every E:CLEAR is accepted.
 Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
                                  std::uint32_t now_ms) const {
-  if (unread_stops_ != 0) return Refusal::stale;  // their numbers are unknown to the sender
+  if (unread_stops_ != 0) return Refusal::stale;  // the numbers of these stops are not reported yet
   if (command.value != Command::unnamed_cause) {
     const bool named = command.value == safety_.newest() || !safety_.latched();
     return named ? Refusal::none : Refusal::stale;

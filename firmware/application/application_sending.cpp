@@ -17,7 +17,7 @@ constexpr std::size_t safe_fields_size = 22;
 
 }  // namespace
 
-// The controlling host's peer on this port; everyone if it has no path here.
+// The controlling host's peer on this port; everyone if the host has no path on this port.
 std::uint32_t Application::audience(std::uint8_t port) const {
   for (int i = 0; link_.has_owner() && i < paths_.size(); ++i) {
     if (paths_[i].port == port) return paths_[i].peer;
@@ -120,7 +120,7 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   answer(to, writer, now_ms);
 }
 
-// The time in a heartbeat. An echo of 0 means that its host has received no T, so 0 is skipped.
+// The time in a heartbeat. An echo of 0 means that the host has received no T, so 0 is skipped.
 std::uint32_t Application::heartbeat_time(std::uint32_t now_ms) {
   return now_ms != 0 ? now_ms : 0xFFFFFFFFU;
 }
@@ -220,7 +220,7 @@ void Application::send_state(Source to, std::uint32_t& pnum, FieldSet fields, co
   const std::size_t carried = ports_[to.port].port->max_size();
   const std::size_t limit = carried < sizeof buffer ? carried : sizeof buffer;
   const std::size_t room = limit - DatagramWriter::trailer_max - safe_fields_size;
-  if (state.safe != SafeReason::none) {  // send_part() adds these to every part
+  if (state.safe != SafeReason::none) {  // send_part() adds the safe fields to every part
     fields.remove(StateField::safe);
     fields.remove(StateField::fault);
   }

@@ -49,9 +49,9 @@ class UserI2c {
     return answered;
   }
 
-  // Longer than 32 bytes each way at 100 kHz, and than SMBus lets a device stretch the clock.
+  // Longer than a transfer of 32 bytes each way at 100 kHz, and than the longest stretch of SMBus.
   static constexpr std::uint32_t transfer_limit_ms = 35;
-  static constexpr std::uint32_t free_after_ms = 100;  // until a held bus is clocked again
+  static constexpr std::uint32_t free_after_ms = 100;  // time until a held bus is clocked again
 
  private:
   enum class Stage : std::uint8_t { idle, transfer, recovering, held };

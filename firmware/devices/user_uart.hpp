@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A UART for the user (docs/how-to/devices.md).
 //
-// Received bytes are kept in order and counted. A state takes up to 64 new bytes. If there is room,
-// it first repeats bytes that were new in the previous state:
+// Received bytes are kept in order and counted. A state has up to 64 new bytes. If there is room,
+// the state first repeats bytes that were new in the previous state:
 //     kept        … 100                               164          190
 //     a state              |--------- new ------------|
 //     the next             |---- again ----|--- new (26) ---|          position 126, 64 bytes
@@ -51,7 +51,7 @@ class UserUart {
   std::uint32_t kept_ = 0;   // the next byte
   std::uint32_t told_ = 0;   // end of the newest state
   std::uint32_t first_ = 0;  // start of the newest state
-  std::uint32_t new_ = 0;    // its first new byte
+  std::uint32_t new_ = 0;    // first new byte of the newest state
   std::uint32_t lost_ = 0;
   std::uint32_t end_ = 0;  // index in bytes_ of the next byte
   std::uint8_t bytes_[capacity];

@@ -57,7 +57,7 @@ class ChipDriver {
   void begin();
   // Does the next steps of the set-up; once ready, writes the registers that change.
   void poll(std::uint32_t now_us, BusBudget& budget);
-  // Both do nothing unless ready(). verify() compares the chip's registers with the written values.
+  // No effect before ready(). verify() compares the chip's registers with the written values.
   void write_changes(BusBudget& budget);
   void verify(BusBudget& budget);
   // All outputs are off from the next write on. Sends nothing.

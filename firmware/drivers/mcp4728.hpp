@@ -10,7 +10,7 @@
 //                          EEPROM
 //
 // Only multi-writes with UDAC = 0 are used, so the output changes even if the LDAC pin is not wired
-// low. They include reference, power-down and gain, so a changed channel is right even after an
+// low. Each write has reference, power-down and gain, so a changed channel is right even after an
 // unnoticed reset. The fast write is a third shorter, but depends on LDAC and the registers.
 // Set-up: zeros to all outputs. If the EEPROM does not hold zeros with the supply as reference, as
 // in a new chip, it is written once. Meanwhile the chip ignores other writes.

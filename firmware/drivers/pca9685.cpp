@@ -201,8 +201,7 @@ std::uint16_t Pca9685::next_burst(std::size_t most, Registers& burst) {
   return taken;
 }
 
-// A burst may cover registers of a channel that waits for a later burst. These registers keep their
-// values.
+// A burst may include a channel that waits for a later burst. Its registers keep their values.
 void Pca9685::on_write_changes(BusBudget& budget) {
   while (changed_ != 0) {
     Registers burst;

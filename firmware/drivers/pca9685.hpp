@@ -35,7 +35,7 @@ class Pca9685 final : public ChipDriver {
   static constexpr int channels = 16;
   static constexpr std::uint8_t all_call_address = 0x70;
   static constexpr std::uint32_t oscillator_us = 500;
-  // From the beginning of the poll that wakes the chip. That poll may use the bus for 1500 us.
+  // Counts from the start of the poll that wakes the chip. That poll may use the bus for 1500 us.
   static constexpr std::uint32_t wake_wait_us = oscillator_us + 1500;
 
   static constexpr std::uint8_t prescale_for(std::uint32_t hz) {

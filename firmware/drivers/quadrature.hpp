@@ -43,7 +43,7 @@ class QuadratureEncoder {
   }
 
   std::atomic<std::uint32_t> travelled_{0};  // counts since power-up
-  std::atomic<std::uint32_t> index_at_{0};   // the same at the last rising edge of the index line
+  std::atomic<std::uint32_t> index_at_{0};   // travelled_ at the last rising edge of the index line
   std::atomic<bool> index_seen_{false};
   std::uint32_t zero_at_ = 0;
   // Used by sample() and index() only.

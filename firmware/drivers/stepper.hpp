@@ -26,7 +26,7 @@ class Stepper {
         tick_hz_(tick_hz),
         limit_(speed_limit < tick_hz / 2 ? speed_limit : tick_hz / 2) {}
 
-  // At `speed` steps per second; 0 or less: does not move.
+  // Moves at `speed` steps per second; 0 or less: does not move.
   void go(std::int32_t position, std::int32_t speed);
   // A pulse that has begun ends with the next tick.
   void stop() { speed_.store(0, std::memory_order_relaxed); }
@@ -51,7 +51,7 @@ class Stepper {
   std::atomic<std::int32_t> target_{0};
   std::atomic<std::int32_t> position_{0};
   // Used by tick() only.
-  std::int32_t part_ = 0;  // of a step, in 1/tick_hz
+  std::int32_t part_ = 0;  // fraction of a step, in 1/tick_hz
   Heading heading_ = Heading::unknown;
   bool pulse_ = false;
 };

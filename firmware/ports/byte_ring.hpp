@@ -49,14 +49,14 @@ class ByteRing {
 
   // The byte that take() returns after `offset` other bytes; offset < size().
   char peek(std::uint32_t offset) const { return bytes_[(load(taken_) + offset) % capacity]; }
-  // Removes the newest bytes until `size` are left. Only while the taker does not run.
+  // Removes the newest bytes until `size` are left. Call only while the taker does not run.
   void cut(std::uint32_t size) { put_.store(load(taken_) + size, std::memory_order_release); }
 
  private:
   using Index = std::atomic<std::uint32_t>;
   static std::uint32_t load(const Index& index) { return index.load(std::memory_order_acquire); }
 
-  Index put_{0};  // bytes so far; wraps
+  Index put_{0};  // bytes put so far; wraps
   Index taken_{0};
   char bytes_[capacity];
 };

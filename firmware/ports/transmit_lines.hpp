@@ -31,7 +31,7 @@ class TransmitLines {
     std::memcpy(waiting_, datagram.data(), datagram.size());
     waiting_size_ = datagram.size();
   }
-  // Moves the waiting state into the ring if there is room. Call with the taker's interrupt off.
+  // If there is room, moves the waiting state into the ring. Call with the taker's interrupt off.
   void poll(std::uint32_t now_ms) {
     if (ring_.size() == 0 || taken_ != taken_before_) {
       taken_before_ = taken_;
@@ -44,7 +44,7 @@ class TransmitLines {
     if (waiting_size_ != 0 && put_state_line(Text(waiting_, waiting_size_))) waiting_size_ = 0;
   }
 
-  // Drops all lines, because the host has disconnected. Only while the taker does not run.
+  // Drops all lines, because the host has disconnected. Call only while the taker does not run.
   void clear() {
     if (!ring_.empty() || waiting_size_ != 0) ++dropped_;
     ring_.cut(0);
@@ -86,7 +86,7 @@ class TransmitLines {
   ByteRing<capacity> ring_;
   char waiting_[max_datagram];
   std::size_t waiting_size_ = 0;
-  volatile std::uint32_t taken_ = 0;  // bytes so far; wraps
+  volatile std::uint32_t taken_ = 0;  // bytes taken so far; wraps
   std::uint32_t taken_before_ = 0;
   std::uint32_t progress_ms_ = 0;
   bool stalled_ = false;

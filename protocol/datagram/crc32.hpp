@@ -12,7 +12,7 @@ namespace r4 {
 // `crc`: CRC of the preceding bytes. Host: libdeflate if available; board: a 1 KiB table.
 std::uint32_t crc32(Text bytes, std::uint32_t crc = 0);
 
-// The form with a table, for the board. Tests compare crc32() with it.
+// The form with a table, for the board. Tests compare crc32() with crc32_table().
 std::uint32_t crc32_table(Text bytes, std::uint32_t crc = 0);
 
 }  // namespace r4

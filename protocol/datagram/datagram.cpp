@@ -63,7 +63,7 @@ const char* first_wrong_byte(Text fields) {
   return at;
 }
 
-// Reads a number that may occur once. Returns the wrong byte, or nullptr if there is none.
+// Reads a number that may occur once. Returns the wrong byte; nullptr: no wrong byte.
 template <class Number>
 const char* take_number(Text name, Text value, bool& has, Number& number) {
   if (has) return name.begin();

@@ -31,7 +31,7 @@ inline bool is_in(std::uint8_t byte_class, char byte) {
   return (byte_classes.of[static_cast<unsigned char>(byte)] & byte_class) != 0;
 }
 
-// The first byte in [at, end) outside the class; `end` if there is none.
+// The first byte in [at, end) outside the class; `end`: no such byte.
 inline const char* skip(std::uint8_t byte_class, const char* at, const char* end) {
   while (at != end && is_in(byte_class, *at)) ++at;
   return at;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Numbers from text and to text, for all code. The whole text must be the number, without blanks
-// and '+'. If it is not valid, a reader returns false and, unless noted, leaves `out` unchanged.
+// and '+'. For other text a reader returns false and leaves `out` unchanged, except where noted.
 #pragma once
 
 #include <cstddef>
@@ -35,13 +35,13 @@ bool parse_session_id(Text text, SessionId& out);
 constexpr std::size_t max_number_text = 20;
 
 // Writers write the shortest form to `out`, which must have room for max_number_text characters.
-// They return the position after the last character and write no NUL.
+// Writers return the position after the last character and write no NUL.
 char* write_number(char* out, std::uint32_t value);
 char* write_number(char* out, std::uint64_t value);
 char* write_number(char* out, std::int32_t value);
 char* write_hundredths(char* out, std::int32_t hundredths);  // always two decimals: "1.00"
 char* write_hex(char* out, std::uint32_t value);             // lower case, no leading zeros
-// Two lower-case digits for each byte; `out` must have room for them.
+// Two lower-case digits for each byte; `out` must have room for the digits.
 char* write_hex(char* out, const std::uint8_t* bytes, std::size_t size);
 char* write_session_id(char* out, SessionId sid);  // session_id_size characters
 

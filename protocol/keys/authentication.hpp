@@ -4,7 +4,7 @@
 // heartbeats: 64 random bits, `AN:<16 hex digits>;`. The host's last field is the signature:
 //     A:<key id>,<counter>,<board T>,<tag>;
 // The tag is 64 bits of keyed BLAKE2s over "R4A1", the digits of AN and every byte of the datagram
-// before the tag. It is 11 characters of base64url without padding (RFC 4648, 5). No encryption.
+// before the tag. A tag is 11 characters of base64url without padding (RFC 4648, 5). No encryption.
 #pragma once
 
 #include <cstddef>
@@ -58,7 +58,7 @@ class Authentication {
   Text nonce() const { return Text(nonce_, has_nonce_ ? nonce_size : 0); }
   // Takes another nonce: earlier signatures become invalid, and counters restart.
   void renew();
-  // For a bridge: takes its board's nonce. A new nonce restarts counters; empty: none is authentic.
+  // For a bridge: its board's nonce. A new one restarts counters. Empty: no datagram is authentic.
   void follow(Text nonce);
 
   bool has_chance() const { return has_chance_; }
@@ -68,7 +68,7 @@ class Authentication {
   // Checks the signature. If its tag is valid, its counter is used up.
   Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
   // Counts a datagram whose required signature is missing or not valid. True if the board must
-  // answer. It does not answer a datagram that the network repeated or delayed.
+  // answer. The board does not answer a datagram that the network repeated or delayed.
   bool rejected(Verdict verdict);
   std::uint32_t rejections(Verdict verdict) const {
     return rejections_[static_cast<std::size_t>(verdict)];

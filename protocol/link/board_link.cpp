@@ -106,7 +106,7 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   if (!heartbeat.has_pnum) return;
   newest_heartbeat_ = heartbeat.pnum;
   // The marks cover late_limit_ms at any heartbeat rate. A heartbeat between two marks counts as
-  // arrived at the earlier. When the oldest mark is dropped, the next is already past the limit.
+  // arrived at the earlier mark. When the oldest mark is dropped, the next mark is past the limit.
   constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1) + 1;
   if (marks_used_ != 0 && at_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
     marks_[marks_used_ - 1].pnum = heartbeat.pnum;

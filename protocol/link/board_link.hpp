@@ -8,7 +8,7 @@
 //
 //     host with a session id (SID)  Each heartbeat must echo the T of a board heartbeat that is at
 //                                   most `timeout` old and, in LOST, was sent after the loss.
-//     paper host (no SID)           Its source identifies it. If its T was an echo once, it must
+//     paper host (no SID)           The source identifies the host. If T was an echo once, it must
 //                                   continue to echo. Otherwise T is its own clock, and heartbeats
 //                                   count on arrival. It never resumes a session, because in LOST
 //                                   nothing proves that it is the same host.
@@ -46,7 +46,7 @@ enum class BoardLinkState : std::uint8_t { connecting, active, lost };
 
 enum class HeartbeatEffect : std::uint8_t {
   fed,
-  repeated,     // its path is alive, but another path delivered this or a newer heartbeat before
+  repeated,     // the path is alive, but another path delivered this or a newer heartbeat before
   resumed,      // LOST -> ACTIVE, the same session continues
   new_session,  // the sender takes control; setpoints of an earlier host must not be restored
   stale,        // no effect: no echo, an old echo, overtaken, or read too late
@@ -64,8 +64,8 @@ class BoardLink {
   explicit BoardLink(Timing timing) : timing_(timing) {}
   void set_timing(Timing timing) { timing_ = timing; }
 
-  // `t` is 0 if the heartbeat has no T. It arrived at most `waited_ms` before this call, and counts
-  // from the earliest possible arrival. A heartbeat that may have waited for the timeout is stale.
+  // `t`: 0 without a T. The heartbeat arrived at most `waited_ms` before this call, and counts from
+  // the earliest possible arrival. A heartbeat that may have waited for the timeout is stale.
   struct HostHeartbeat {
     HostId host;
     bool has_pnum = false;

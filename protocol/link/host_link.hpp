@@ -43,7 +43,7 @@ class HostLink {
   void on_heard(std::uint32_t now_ms);
   // The board reports that it is booting, so it has no session.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
-  // The board restarted, or the host's clock stood still: a new session, unless on_booting() came.
+  // The board restarted, or the host's clock stood still. Without on_booting() the session ends.
   void on_restart();
 
   // The host's machine slept: the board counts as restarted, and a new session is needed.
@@ -63,7 +63,7 @@ class HostLink {
   // The T for the next heartbeat: the T of the board's newest heartbeat, 0 before the first.
   std::uint32_t echo() const { return echo_; }
 
-  // Heartbeats stop if feed() is not called for `period_ms`, until the next call. 0: off.
+  // If feed() is not called for `period_ms`, heartbeats stop until the next call. 0: off.
   void watchdog(std::uint32_t period_ms, std::uint32_t now_ms);
   void feed(std::uint32_t now_ms);
   bool watchdog_expired(std::uint32_t now_ms) const {
@@ -81,7 +81,7 @@ class HostLink {
   std::uint32_t due_in(std::uint32_t now_ms) const;
 
   HostLinkState state() const { return state_; }
-  // True if the host has echoed a T of this boot. Before, the board executes none of its commands.
+  // True if the host has echoed a T of this boot. Before, the board executes no command.
   bool echoed() const { return echoed_; }
   std::uint32_t restarts() const { return restarts_; }
   SafeReason reason() const { return reason_; }
@@ -103,7 +103,7 @@ class HostLink {
   std::uint32_t echo_ = 0;
   std::uint32_t heard_ms_ = 0;
   bool heard_ = false;
-  bool booting_ = false;  // in the newest report
+  bool booting_ = false;  // the newest report was of a booting board
   std::uint32_t restarts_ = 0;
   std::uint32_t sent_ms_ = 0;
   bool any_sent_ = false;

@@ -21,7 +21,7 @@ class SessionPaths {
   // Makes this the only path: for a new session, or after an outage (the host's numbers continue).
   void begin(Source at, std::uint32_t now_ms);
   void resume(Source at, std::uint32_t now_ms);
-  // A heartbeat of the session with a fresh echo came from `from`. True if it made a new path.
+  // A heartbeat of the session with a fresh echo came from `from`. True if the path is new.
   bool on_heartbeat(Source from, std::uint32_t now_ms);
   // True if a silent path was removed: `left`. Never removes the last path. Call until false.
   bool take_silent(std::uint32_t timeout_ms, std::uint32_t now_ms, Source& left);

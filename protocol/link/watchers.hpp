@@ -19,11 +19,11 @@ namespace r4 {
 struct Watcher {
   Source at;
   std::uint32_t token = 0;
-  std::uint32_t pnum = 0;       // of the next datagram for this watcher alone
-  std::uint32_t period_ms = 0;  // between its states; 0: free
+  std::uint32_t pnum = 0;       // number of the next datagram for this watcher alone
+  std::uint32_t period_ms = 0;  // time between two states; 0: free
   std::uint32_t renewed_ms = 0;
   std::uint32_t next_ms = 0;
-  bool chooses = false;  // true if it chose its fields
+  bool chooses = false;  // true if the watcher chose its fields
   FieldSet fields;
 
   // True if a state is due at `t_ms`; then schedules the next state.

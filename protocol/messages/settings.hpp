@@ -37,12 +37,12 @@ Refusal set(Settings& settings, Text key, Text value);
 // Lines "key,value", each ended by a line feed, for storage. False if `capacity` is too small.
 constexpr std::size_t max_settings_text = 1440;
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
-// Reads such lines, in any order. Skips unknown and invalid lines, because the text may be from
-// another firmware. A missing or invalid wiring counts as damaged: the board must not guess.
+// Reads lines of this form, in any order. Skips unknown and invalid lines, because the text may be
+// from another firmware. A missing or invalid wiring counts as damaged: the board must not guess.
 void read_settings(Text text, Settings& settings);
 
-// The secret part of a command's text ("C:password,letmein!", "C:key,1:5a…"); empty if there is
-// none. The value of an unknown setting counts as secret, because its name may be misspelled.
+// The secret part of a command's text ("C:password,letmein!", "C:key,1:5a…"); empty if the text has
+// no secret. The value of an unknown setting counts as secret, because its name may be misspelled.
 Text secret_in(Text command);
 
 }  // namespace r4

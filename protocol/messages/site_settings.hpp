@@ -2,7 +2,7 @@
 // The settings of one board at its site (r4link/tables/settings.hpp; docs/reference/protocol.md,
 // section 3). Only a host on the board's own cable may change them (Port::may_configure()). In a
 // name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 a percent
-// sign, %6Fff the network "off". Node and wiring take effect at the next start, the others at once.
+// sign, %6Fff the network "off". Node and wiring take effect at the next start, the rest at once.
 #pragma once
 
 #include <cstddef>
@@ -69,14 +69,14 @@ Refusal set_number(Number& member, const SettingRow& row, Text value) {
   return refusal;
 }
 
-// As set() in settings.hpp. Refusal::unknown for a setting that is not of the site.
+// Like set() in settings.hpp. Refusal::unknown for a setting that is not of the site.
 Refusal set(SiteSettings& settings, FoundSetting found, Text value);
 
 // The longest value: a wiring, or each byte of a password as %XX.
 constexpr std::size_t max_site_value =
     max_wiring_value > 3 * password_max ? max_wiring_value : 3 * password_max;
 // Gets the key of setting `index`, from 0, and its value as set() takes it. False if there is no
-// such setting. Includes secrets, so use it only for storage.
+// such setting. Values include secrets: use get() only for storage.
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],
          Text& value);
 

@@ -286,7 +286,7 @@ bool parse_safe_reason(Text text, SafeReason& out) {
 
 bool read_state(const Datagram& datagram, State& state) {
   if (datagram.has_time() && datagram.time_ms() > 0xFFFFFFFFU) return false;
-  // Read in place, and undone on failure, because copying a newly written state takes longer.
+  // Fields are read in place, and undone on failure: copying a newly written state takes longer.
   Before before(state);
   if (!read_fields(datagram, state, before)) {
     before.restore();

@@ -18,7 +18,7 @@ TITLES = {
     'devices': 'Devices of your own', 'recording': 'Recordings', 'simulation': 'Simulated boards',
     'transport': 'Transports of your own', 'aio': 'asyncio: r4link.aio', 'control': 'Control: r4link.control',
     'testing': 'Tests: r4link.testing'}
-# Modules that programs import by name. The page has all their names. Of other modules it has the names in
+# Modules that programs import by name. The page has all their names. Of other modules the page has the names in
 # r4link.__all__.
 WHOLE = ('aio', 'control', 'devices', 'testing')
 # The results of calls that wait: of a blocking board as listed, in r4link.aio as coroutines.

@@ -120,7 +120,7 @@ local function decimal(hex, halved)
     local number = hex == "" and 0 or tonumber(hex, 16)
     return plain(halved and math.ceil(number / 2) or number)
   end
-  local low, high = 0, 0 -- of base 10^9
+  local low, high = 0, 0 -- digits of base 10^9
   for digit in hex:gmatch(".") do
     low = low * 16 + tonumber(digit, 16)
     high = high * 16 + math.floor(low / 1e9)

@@ -40,9 +40,9 @@ KERNEL_ARGUMENTS = ('console=ttyS0 quiet panic=-1 mitigations=off no_timer_check
 MACHINE = ('-M pc -cpu max,-la57,-smap,-smep,-umip,-pku -m 768M '
            '-nodefaults -no-user-config -vga none -display none -no-reboot -device virtio-serial-pci,max_ports=8').split()
 # One processor, whose instructions take 2 ns each. The guest's clock counts them, and stops while QEMU has no
-# processor. While the guest waits, its clock is this machine's.
+# processor. While the guest waits, the guest's clock is this machine's.
 COUNTED_TIME = '-accel tcg -icount shift=1 -smp 1'.split()
-# For a guest with a cable to a program of this machine: both must have the same clock.
+# A guest with a cable to a program of this machine needs the same clock as the program.
 REAL_TIME = '-accel tcg,thread=multi -smp 2'.split()
 CAN = ('-object can-bus,id=bus -device kvaser_pci,canbus=bus '
        '-device kvaser_pci,canbus=bus').split()

@@ -71,7 +71,7 @@ class Interfaces:
         try:
             fcntl.flock(self._users, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            return  # another program uses them
+            return  # another program uses the interfaces
         for interface in os.pread(self._users, 4096, 0).decode().split():
             ip(f'link del {interface}')
         os.ftruncate(self._users, 0)

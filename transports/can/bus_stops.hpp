@@ -26,10 +26,10 @@ class BusStops {
 
   // Sends the frame without a number. Boards of all versions obey it, each time as a new stop.
   SendResult send_bare();
-  // Sends a stop's bare frame, and sets `number` for repeat(). Stops of one turn of the loop,
-  // within `together`, share both, unless `own` has an earlier stop with that number.
+  // Sends a stop's bare frame, and sets `number` for repeat(). If `own` has no earlier stop with
+  // that number, stops of one turn, within `together`, share frame and number.
   SendResult announce(const StopNumbers& own, std::uint32_t& number);
-  // Sends the frame with that number, unless it was sent within `spacing`.
+  // If the frame with that number was not sent within `spacing`, sends the frame.
   SendResult repeat(std::uint32_t number);
 
  private:

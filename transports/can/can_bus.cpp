@@ -113,7 +113,7 @@ void CanBus::clear_places() {
     hear();
 }
 
-// If refused, the bus goes down in the next turn, because a member may be joining or leaving.
+// If hear() fails, the bus goes down in the next turn, because a member may be joining or leaving.
 void CanBus::hear() {
   if (medium_->number() < 0 || set_filters()) return;
   asio::post(io_, deafness_.handler([this, error = errno] {
@@ -308,7 +308,7 @@ void CanBus::look() {
   look_at_controller();
 }
 
-void CanBus::tell(CarrierEvent event) {  // by value: standing_ may change in a call
+void CanBus::tell(CarrierEvent event) {  // by value, because standing_ may change in a call
   for_each_member([&](Member& member) { member.on_bus(event); });
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CAN medium that members in one event loop share. It has one socket with kernel filters for the
-// ids in use, passes frames in batches, and reports the state of the bus as events.
-// A member receives the frames with the ids of all members, except frames that members send. Frames
-// leave in the order of offers, and no transfer interrupts another member's transfer. The bus takes
-// at most `ahead` frames, and more when the interface has taken all of them. After 100 ms without
-// progress it drops them. Without a wire (vcan, vxcan), it polls briefly before it sleeps.
+// A CAN medium that members in one event loop share. The bus has one socket with kernel filters for
+// the ids in use, passes frames in batches, and reports the state of the bus as events. A member
+// receives the frames with the ids of all members, except frames that members send. Frames leave in
+// the order of offers, and no transfer interrupts another member's transfer. The bus takes at most
+// `ahead` frames, and more when the interface has taken all of them. After 100 ms without progress
+// the bus drops these frames. Without a wire (vcan, vxcan), the bus polls briefly before sleeping.
 #pragma once
 
 #include <algorithm>
@@ -40,15 +40,15 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
     virtual void on_drained() {}  // all arrived frames were delivered
     // True during a transfer whose next frame comes from the other end.
     virtual bool awaits_frame() const { return false; }
-    // True if there is a frame to send now. The bus accepts it with frame_sent().
+    // True if there is a frame to send now. The bus accepts the frame with frame_sent().
     virtual bool offer(std::uint32_t, CanFrame&) { return false; }
-    // As offer(), for a frame that may overtake accepted frames.
+    // Like offer(), for a frame that may overtake accepted frames.
     virtual bool offer_urgent(std::uint32_t, CanFrame&) { return false; }
     virtual void frame_sent(std::uint32_t) {}
     // The interface has taken a frame of this member after a wait.
     virtual void on_late_frame(const CanFrame&, std::uint32_t) {}
     virtual void on_sent() {}  // all members had a turn to offer frames: time to set a timer
-    // The bus came up, went down (which ends all transfers), or has a warning.
+    // The bus is up, is down (which ends all transfers), or has a warning.
     virtual void on_bus(const CarrierEvent& event) = 0;
     // The bus took no frame for `patience`: the waiting frames are lost.
     virtual void on_stuck() {}
@@ -89,7 +89,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool up() const { return trouble_ != Trouble::down; }
   // The newest event, for a new member; none if the event does not apply at present.
   const std::optional<CarrierEvent>& standing() const { return standing_; }
-  // True if frames wait for the interface. When it has taken all of them, members may offer again.
+  // True if frames wait for the interface. When no frame waits, members may offer again.
   bool full() const { return out_count_ != 0; }
   template <class Predicate>
   bool holds(Predicate predicate) const {

@@ -50,7 +50,7 @@ class CanSocket final : public CanMedium {
   bool simulated_ = false;
   bool heard_rate_switch_ = false;
   std::uint32_t overflows_ = 0;
-  std::uint32_t overflows_before_ = 0;  // of earlier openings
+  std::uint32_t overflows_before_ = 0;  // overflows of earlier openings
   const std::unique_ptr<Inbox> inbox_;
 };
 

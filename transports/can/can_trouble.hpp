@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Whether a board and other hosts are heard on a CAN bus, and why datagrams do not pass. No I/O.
 //     foreign frames   frames came on the board's command id for host_completes, but no whole
-//                      datagram. A host sends ten heartbeats a second, so another protocol uses it
+//                      datagram. A host sends ten heartbeats a second: another protocol has the id
 //     late frames      the board is heard, but late_transfers transfers within late_within were not
 //                      answered in time (N_Bs, N_Cr): frames are held back, or lost
 #pragma once
@@ -66,7 +66,7 @@ class CanTrouble {
   Time host_completed_;
   Time frames_since_;  // the first frame after the last datagram or pause
   std::uint64_t late_count_ = 0;
-  std::array<Time, late_transfers> late_;  // the newest, in a ring
+  std::array<Time, late_transfers> late_;  // the newest late transfers, in a ring
 };
 
 }  // namespace r4

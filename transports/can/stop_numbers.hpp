@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // On the bus, a stop of this host has a number of 18 bits instead of its packet number of 32 bits.
-// A board reports it in the heartbeat field STOP. Keeps the newest 16, as a session does.
+// A board reports the short number in the field STOP. Like a session, keeps the newest 16 stops.
 #pragma once
 
 #include <cstddef>

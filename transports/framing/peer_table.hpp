@@ -30,7 +30,7 @@ class PeerTable {
   // The number of the sender of a valid datagram that is not a W.
   std::uint32_t heard(const Address& from) { return heard(from, Says::other); }
 
-  // True if the sender of that number has asked to watch, and has sent no heartbeat since.
+  // True if the sender of that number has requested to watch, and has sent no heartbeat since.
   bool watches(std::uint32_t number) const {
     for (const Entry& entry : entries_) {
       if (number != nobody && entry.number == number) return entry.watches;
@@ -65,7 +65,7 @@ class PeerTable {
     Address address = Address();
     std::uint32_t number = nobody;  // nobody: free
     bool watches = false;
-    std::uint64_t heard = 0;  // turn_ at its newest datagram
+    std::uint64_t heard = 0;  // turn_ at the host's newest datagram
   };
   enum class Says : std::uint8_t { other, watch, heartbeat };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport with a bad link in both directions. On CAN it affects whole datagrams, not frames.
+// A transport with a bad link in both directions. On CAN the impairment affects whole datagrams.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -39,7 +39,7 @@ double share(std::string_view part, std::string_view text) {
   return percent / 100;
 }
 
-// An hour at most. `unit`: the unit if the text has none.
+// A time of at most an hour. If the text has no unit, `unit` is used.
 Time duration(std::string_view part, std::string_view& text, std::string_view unit) {
   const double value = number(part, text, 3'600'000);
   const bool ms = take(text, "ms");

@@ -32,7 +32,7 @@ struct Impairment {
 };
 
 struct ImpairmentCounters {
-  std::uint64_t passed = 0;  // with duplicates
+  std::uint64_t passed = 0;  // passed datagrams, with duplicates
   std::uint64_t lost = 0;
   std::uint64_t duplicated = 0;
   std::uint64_t corrupted = 0;

@@ -79,7 +79,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     changed_.notify_all();
     return true;
   }
-  // At most `most` items, oldest first; none from before a failure. After `most`, news() follows.
+  // Oldest first, at most `most`; none from before a failure. After `most` items, news() follows.
   std::vector<Item> take(std::size_t most) {
     const std::lock_guard lock(mutex_);
     if (state_ != State::up) return {};

@@ -127,7 +127,7 @@ class OwnCanMedium final : public CanMedium {
   const std::string& name() const override { return source_->name; }
   void open() override {
     source_->exchange->start();
-    source_->wake();  // for frames that came before this call
+    source_->wake();  // for frames that arrived before this call
     open_ = true;
   }
   void close() noexcept override { open_ = false; }

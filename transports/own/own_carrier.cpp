@@ -64,7 +64,7 @@ class OwnCarrier final : public Carrier {
     if (!exchange_) make_exchange();
     exchange_->start();
     handler_ = &handler;
-    post_take(opening_);  // for datagrams that came before this call
+    post_take(opening_);  // for datagrams that arrived before this call
     report();
   }
   void close() noexcept override {
@@ -108,7 +108,7 @@ class OwnCarrier final : public Carrier {
         std::make_unique<DatagramOutbox>(),
         [this, opening = std::weak_ptr<int>(opening_)] { post_take(opening); });
   }
-  // On any thread.
+  // Runs on any thread.
   void post_take(const std::weak_ptr<int>& opening) {
     loop_.post([this, opening] {
       if (!opening.expired() && handler_ != nullptr) take();

@@ -10,7 +10,7 @@ namespace r4 {
 struct SerialPort {
   std::string path;           // "/dev/ttyACM0"
   std::string description;    // "Giga"; may be empty
-  std::string serial_number;  // of the USB device; may be empty
+  std::string serial_number;  // serial number of the USB device; may be empty
   std::uint16_t vid = 0;      // 0: not a USB device
   std::uint16_t pid = 0;
   bool is_r4 = false;  // an Arduino Giga R1 with a sketch running, by vid and pid

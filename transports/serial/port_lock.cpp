@@ -18,7 +18,7 @@ struct flock bytes_from(off_t first, off_t count) {
   return bytes;
 }
 
-// A lock of another opening at or after that byte. Its type is F_UNLCK if there is none.
+// A lock of another opening at or after that byte. Without such a lock, the type is F_UNLCK.
 struct flock other_from(int device, off_t first) {
   struct flock bytes = bytes_from(first, 0);
   if (::fcntl(device, F_OFD_GETLK, &bytes) != 0) bytes.l_type = F_UNLCK;
@@ -28,7 +28,7 @@ struct flock other_from(int device, off_t first) {
 }  // namespace
 
 bool PortLock::lock(int device, const DeviceClaim& claim) {
-  // For foreign programs, which lock the whole device.
+  // Foreign programs lock the whole device.
   if (::flock(device, LOCK_SH | LOCK_NB) != 0) return false;
   off_t place = 0;
   while (true) {

@@ -93,7 +93,7 @@ SerialCarrier::SerialCarrier(asio::io_context& io, Url url, Claim claim)
 void SerialCarrier::open(Handler& handler) {
   close();
   open_device(find_device(url_));
-  claim_->takes = false;  // at the next opening, another program may have the device rightly
+  claim_->takes = false;  // at the next opening, another program may have a right to the device
   handler_ = &handler;
   report_up();
 }

@@ -65,7 +65,7 @@ class ShareClient {
   OperationSlot answering_;
   std::string thing_;
   pid_t process_ = 0;
-  bool heard_ = false;  // since look_for_answer()
+  bool heard_ = false;  // a message arrived since look_for_answer()
   bool asked_ = false;  // true until the holder answers
   std::array<char, ShareMessage::max_size + 1> packet_;
 };

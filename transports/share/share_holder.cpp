@@ -88,7 +88,7 @@ bool ShareHolder::hold(const ShareName& name, BoardRole role) {
   return true;
 }
 
-// Closed, with errno, if the loop cannot wait for it. An exception could end a driving program.
+// If the loop cannot wait: closed, with errno. An exception could end a driving program.
 LoopDescriptor ShareHolder::on_loop(FileDescriptor descriptor) {
   LoopDescriptor waited_for(io_);
   if (!descriptor) return waited_for;

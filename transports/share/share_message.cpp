@@ -8,7 +8,7 @@ namespace {
 
 using Kind = ShareMessage::Kind;
 
-// The texts come from another program, and may go to a terminal.
+// The texts are from another program, and may be printed on a terminal.
 bool is_printable(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);

@@ -119,7 +119,7 @@ class SharedCarrier final : public Carrier,
   bool up_ = false;
   std::optional<Problem> trouble_;  // why the transport is down, or its warning
   Carrier::Handler* handler_ = nullptr;
-  CarrierCounters shared_counters_;  // of datagrams through another holder
+  CarrierCounters shared_counters_;  // counts of datagrams through another holder
   mutable CarrierCounters counted_;
 };
 
@@ -303,7 +303,7 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
 }
 
 void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
-  // This program first, because it may be driving.
+  // This program gets the datagram first, because it may be driving.
   handler_->on_datagram(bytes, from);
   if (state_ == State::holding) holder_.tell(Kind::received, bytes);
 }

@@ -7,11 +7,11 @@
 //      |   +---- a controlling program asks for the transport, or takes it; or the role changes
 //      |   |
 //      +-> holding, with the carrier open: no program holds it, or the holder was passed over
-// The controlling program holds the transport, so its datagrams never wait for another program. It
-// also has a separate name, so a second controlling program is refused at once. Watching programs
-// receive all datagrams, and send stops. A program that takes control first takes the separate
-// name; if refused, nothing changes. Then it reopens the transport, because a controlling program
-// opens it differently (DeviceClaim), and the served programs seek the holder again.
+// The controlling program holds the transport, so its datagrams never wait for another program. The
+// program also has a separate name, so a second controlling program is refused at once. Watching
+// programs receive all datagrams, and send stops. A program that takes control first takes the
+// separate name; if refused, nothing changes. Then the program reopens the transport, because
+// control needs another DeviceClaim, and the served programs seek the holder again.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -23,8 +23,8 @@
 
 namespace r4 {
 
-// Reports the same as `own`, whichever program holds the transport. open() does not wait. It throws
-// Error{refused} if another program controls the board, or an error of `own`.
+// Reports the same as `own`, whichever program holds the transport. open() does not wait. open()
+// throws Error{refused} if another program controls the board, or an error of `own`.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
                                              Claim claim, FindShareName find, BoardRole role);
 

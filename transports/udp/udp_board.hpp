@@ -48,7 +48,7 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
   const HostLookup lookup_;
   PeerTable<Place, peer_places> peers_;
   bool at_all_addresses_ = false;
-  asio::ip::address sent_to_;      // of the packet that is being read
+  asio::ip::address sent_to_;      // destination of the packet that is being read
   std::optional<Place> audience_;  // the destination of datagrams for everyone
 };
 

@@ -10,7 +10,7 @@
 // A board keeps the last 16 hosts that sent a valid datagram, and always the controlling host.
 // Datagrams for everyone go to the peer in the URL, else to the controlling host, else to the host
 // heard last. An answer goes to the sender of the question, and also to a peer at the same address,
-// because the paper's Python client does not listen at the port from which it asks.
+// because the paper's Python client does not listen at the port from which it sends.
 // open() looks a name up. Within a handler of the loop a host's open() does not wait. The host is
 // `down` until the name is known, and repeats the lookup each second. If a host hears nothing valid
 // for 3 to 6 s, it repeats the lookup or search, and follows the board. The board that a search

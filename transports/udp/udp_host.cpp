@@ -27,7 +27,7 @@ void UdpHost::open(Handler& handler) {
   if (named_ && io_.get_executor().running_in_this_thread()) {
     handler_ = &handler;
     network_.enter(*this);
-    return watch();  // asks for the address
+    return watch();  // requests the address
   }
   if (url_.search) {
     const FoundHost board = find_board(search_, wanted_);

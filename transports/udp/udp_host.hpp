@@ -37,11 +37,11 @@ class UdpHost final : public UdpEnd, private NetworkWatch::Member {
   const HostLookup lookup_;
   BoardSearch search_;
   const Claim claim_;
-  WantedBoard wanted_;  // of a search
+  WantedBoard wanted_;  // wanted board of a search
   HostWatch watch_;
   UdpHostSocket host_socket_{socket_};
   NetworkWatch& network_;
-  bool named_ = false;  // the address of the board comes from a lookup or a search
+  bool named_ = false;  // the address of the board is from a lookup or a search
   Endpoint board_;
 };
 

@@ -19,8 +19,8 @@ struct UdpUrl {
 
   std::string text;
   bool search = false;  // udp:auto, udp:?id=NAME: a search finds the board
-  std::string called;   // its name or board id; empty: the only board
-  std::string host;     // of the board; at a board: where it listens
+  std::string called;   // the board's name or id; empty: the only board
+  std::string host;     // the board's host; at a board: the own address
   std::uint16_t port;
   std::uint16_t listen;
   bool names_listen;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Converts the connected analog inputs in turn, one per poll; unconnected inputs read 0. From the
-// loop only. The core sets up pins and converter. Then this class uses the registers of ADC1
-// (RM0399, chapter ADC), and never waits. The core would wait up to 10 ms for a conversion, and end
-// the boot if the converter does not switch on.
+// Converts the connected analog inputs in turn, one per poll; unconnected inputs read 0. Call from
+// the loop only. The core sets up pins and converter. Then this class uses the registers of ADC1
+// (RM0399, chapter ADC), and never waits. The core would wait up to 10 ms for a conversion. If the
+// converter did not switch on, the core would end the boot.
 #pragma once
 
 #include <cstdint>
@@ -99,7 +99,7 @@ class AnalogInputs {
 
   AnalogValue (&values_)[analog_channels];
   Late<mbed::AnalogIn> converters_[analog_channels];
-  std::uint32_t inputs_[analog_channels] = {};  // of ADC1
+  std::uint32_t inputs_[analog_channels] = {};  // inputs of ADC1
   bool any_ = false;                            // an input is connected
   int next_ = 0;
   int late_ = 0;

@@ -61,7 +61,7 @@ Fdcan* interrupting = nullptr;
 UsbPort* listening = nullptr;
 // NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
-// In an interrupt, so that a stop works even if the loop hangs.
+// Called in an interrupt, so that a stop works even if the loop hangs.
 void hear_can() {
   if (interrupting->on_interrupt()) stop_at_once();
   wake_loop();
@@ -83,7 +83,7 @@ void start_listening(UsbPort& usb) {
   UsbPort::start();
 }
 
-// Requests the board's report. Every datagram is longer.
+// Requests the board's report. Every datagram is longer than this word.
 constexpr Text report_word("report");
 
 SafeReason reason_of(const FaultNote& note) {
@@ -161,7 +161,7 @@ void BoardProgram::poll() {
   light_.show(application_.state(), application_.reason(), now_ms);
 }
 
-// The boot loader does not switch the chips off: they would drive their outputs after the reset.
+// The boot loader does not switch the chips off: the chips would drive outputs after the reset.
 void BoardProgram::stay_safe_for_upload() {
   if (usb_.upload_asked()) application_.fail(SafeReason::fault, BoardClock::now_ms());
 }

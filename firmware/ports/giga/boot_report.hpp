@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report of the paper's Figure 3, with its labels, and more: on request, one line a turn. The
-// scan of the I2C bus probes one address a turn, so the loop waits for at most one transfer.
+// The report of the paper's Figure 3, with its labels, and further lines. On request, each turn
+// sends one line. The I2C scan probes one address a turn: at most one transfer.
 #pragma once
 
 #include <cstdint>
@@ -43,7 +43,7 @@ class BootReport {
     address_ = first_address;
   }
   bool running() const { return step_ != 0; }
-  // The next line; empty if this turn has none. Only while running().
+  // The next line; empty if this turn has none. Call only while running().
   Text next(char (&out)[max_line]);
 
  private:

@@ -32,7 +32,7 @@ void start_uarts(UserUartController& first, UserUartController& second) {
     RCC->APB1LENR |= rcc_usart2_and_uart4_on;
     static_cast<void>(static_cast<std::uint32_t>(RCC->APB1LENR));
   }
-  // Default clock of both (RCC_D2CCIP2R).
+  // Default clock of both UARTs (RCC_D2CCIP2R).
   first.start(HAL_RCC_GetPCLK1Freq());
   second.start(HAL_RCC_GetPCLK1Freq());
 }

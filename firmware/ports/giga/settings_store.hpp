@@ -6,8 +6,8 @@
 //     avoided                the store ended the last boot, because the core ends the boot
 //                            when worn-out flash cannot be erased
 //
-// Never writes outside that partition (partition 1 holds the WiFi firmware), nor to a partition
-// larger than partition_max: in older layouts it holds the user's files.
+// Never writes outside partition 3, because partition 1 holds the WiFi firmware. Never writes to a
+// partition larger than partition_max, which in older layouts holds the user's files.
 #pragma once
 
 #include <atomic>
@@ -31,7 +31,7 @@ class SettingsStore {
   void avoid() { state_.store(StoreState::avoided, std::memory_order_relaxed); }
   StoreState state() const { return state_.load(std::memory_order_acquire); }
   // Call once. Without stored settings the defaults stay. If the store is loading or avoided, the
-  // wiring counts as damaged, and nothing is stored later, as it would overwrite the old settings.
+  // wiring counts as damaged, and nothing is stored later, to keep the old settings.
   void load(Settings& settings);
   // Stores `settings` soon, on the thread.
   void keep(const Settings& settings);

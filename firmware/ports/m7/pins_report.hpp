@@ -2,7 +2,7 @@
 // Reports each change of the pins on a UART (`tools/m7 --pins`), so that tests need not rely on the
 // board's states. A line: the time in ms and us, the last datagram in us, the last feeding
 // heartbeat in ms, 1 if the chips' pins are safe, then the outputs as in sim::Pins. A change is
-// noted after its transfer, also in interrupts, and sent by the loop. At most notes_max wait.
+// noted after its transfer, also in interrupts, and sent by the loop. At most notes_max notes wait.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ class PinsReport final : public sim::I2cObserver {
   void on_transfer(const sim::I2cTransfer&) override { look(); }
   void poll();  // in each turn of the loop
 
-  // In interrupts: a datagram came at `ticks` of the board's clock. The newest counts.
+  // Call in interrupts: a datagram arrived at `ticks`. Only the newest datagram is reported.
   static void on_datagram(std::uint32_t ticks) {
     if (static_cast<std::int32_t>(ticks - datagram_ticks_) > 0) datagram_ticks_ = ticks;
   }

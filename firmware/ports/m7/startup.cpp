@@ -55,10 +55,10 @@ __attribute__((naked, noreturn, used)) void r4_exception() {
   r4::m7::halt();
 }
 
-// The compiler needs it, and the C++ library's version would link the heap.
+// The compiler needs this function, and the C++ library's version would link the heap.
 [[noreturn]] void __cxa_pure_virtual() { r4::m7::halt(); }  // NOLINT(bugprone-reserved-identifier)
 
-// For images that do not use the interrupt.
+// Defaults for images that do not use the interrupt.
 [[gnu::weak]] void r4_uart0_receive() { r4::m7::halt(); }
 [[gnu::weak]] void r4_uart0_transmit() { r4::m7::halt(); }
 [[gnu::weak]] void r4_wake() { r4::m7::halt(); }

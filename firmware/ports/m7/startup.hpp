@@ -34,7 +34,7 @@ inline std::uint32_t used_at_most(const std::uint32_t* begin, const std::uint32_
   return static_cast<std::uint32_t>((end - at) * 4);
 }
 
-// True if the word between the stacks is whole. The handlers' stack grows towards it.
+// True if the word between the stacks is whole. The handlers' stack grows towards this word.
 inline bool canary_alive() { return *r4_handler_stack == untouched; }
 
 }  // namespace m7

@@ -34,7 +34,7 @@ class SimulatedRobot::World : public std::enable_shared_from_this<World> {
  private:
   RobotModel* const robot_;  // nullptr: the vehicle on the bench
   mutable std::mutex mutex_;
-  asio::io_context* io_ = nullptr;  // of the board, while it is open
+  asio::io_context* io_ = nullptr;  // the board's loop, while the board is open
   SimulatedBoard* board_ = nullptr;
   std::vector<ScriptStep> said_;
   Look look_;

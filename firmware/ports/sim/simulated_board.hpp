@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A whole R4 board in a process: the firmware on a model of the board, reached by any carriers. Its
-// timer sleeps until the application needs time. Then the passed milliseconds are run one by one.
+// A whole R4 board in a process: the firmware on a model of the board, reached by any carriers. The
+// board's timer sleeps until the application needs time. Then each passed millisecond is run.
 //
 // If the guard prevents feeding for watchdog_ms, a hardware watchdog resets the microcontroller,
-// not the chips. The loop checks in even on a slow machine; only a script's `hang` prevents that.
-// Used from the thread of its io_context only. A datagram allocates no heap memory.
+// not the chips. The loop checks in even on a slow machine; only a script's `hang` prevents the
+// check-in. Used from the thread of its io_context only. A datagram allocates no heap memory.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ namespace r4::sim {
 
 class SimulatedBoard final : private firmware::Observer, private CarrierPort::Owner {
  public:
-  // Each may be empty, and must not stop the board. `t_ms`: the board's clock, as in T.
+  // Each function may be empty, and must not stop the board. `t_ms`: the board's clock, as in T.
   struct Events {
     std::function<void(std::uint32_t t_ms, firmware::BoardState, SafeReason)> on_state;
     std::function<void(std::uint32_t t_ms, const Pins&)> on_pins;
@@ -56,7 +56,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     Wiring wired = plan_wiring();  // how the board is wired, independent of its settings
     bool plan_confirmed = true;    // false: no wiring in its settings, as in a new board
     Events events;
-    // A clock in ms, for tests: then the board has no timer, and the caller calls poll().
+    // A clock in ms, for tests. With a clock the board has no timer: the caller calls poll().
     std::function<std::uint32_t()> clock_ms;
   };
 
@@ -74,7 +74,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   // Does everything that is due; returns the milliseconds until the next call.
   std::uint32_t poll();
 
-  // Carries out a step now, as in the script. Only between start() and stop(), and not in an event.
+  // Carries out a step now, as in the script. Call between start() and stop(), not in an event.
   void happen(const ScriptStep& step);
 
   BoardModel& model() { return model_; }
@@ -128,8 +128,8 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   std::uint32_t boots_ = 0;
   Clock::time_point start_;
   std::uint32_t clock_start_ms_ = 0;  // options_.clock_ms at start()
-  Milliseconds passed_{};             // on the board, since start()
-  Milliseconds hangs_until_{};        // of the loop
+  Milliseconds passed_{};             // time passed on the board since start()
+  Milliseconds hangs_until_{};        // end of the loop's hang
   Milliseconds watchdog_fed_{};
   std::optional<Pins> told_pins_;
   bool told_fault_ = false;
@@ -140,7 +140,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   asio::steady_timer timer_;
   bool armed_ = false;
   Milliseconds armed_for_{};
-  std::shared_ptr<const bool> alive_;  // timer handlers may come after stop()
+  std::shared_ptr<const bool> alive_;  // timer handlers may run after stop()
 };
 
 }  // namespace r4::sim

@@ -14,7 +14,7 @@ namespace sim {
 
 class SimulatedHardware final : private BoardModel::Interrupts {
  public:
-  // `wiring`: of the firmware's settings; `trouble`: BoardHardware::Config::wiring_trouble.
+  // `wiring`: the wiring of the settings; `trouble`: BoardHardware::Config::wiring_trouble.
   explicit SimulatedHardware(BoardModel& board, const Wiring& wiring = plan_wiring(),
                              ChipTrouble trouble = ChipTrouble::none);
 
@@ -42,7 +42,7 @@ class SimulatedHardware final : private BoardModel::Interrupts {
   firmware::UserUart uarts_[uart_channels];
   firmware::InputPin *a_[encoder_channels], *b_[encoder_channels], *index_[encoder_channels];
   firmware::InputPin* echo_[ultrasonic_channels];
-  std::uint32_t now_us_ = 0;  // of the microcontroller's clock; wraps
+  std::uint32_t now_us_ = 0;  // time of the microcontroller's clock; wraps
 };
 
 }  // namespace sim

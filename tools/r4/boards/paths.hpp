@@ -41,7 +41,7 @@ inline Json path_json(const PathStatus& path) {
           {"age_ms", milliseconds(path.age_us)}};
 }
 
-// With several paths, reports path changes; for a single path the link reports them.
+// With several paths, reports path changes; for a single path the link reports changes.
 template <class Board, class Report>
 void on_paths(Board& board, Report report) {
   if (board.paths().size() > 1) board.on_path(std::move(report));

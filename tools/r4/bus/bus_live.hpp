@@ -17,7 +17,7 @@ struct LiveBusOptions {
   bool json = false;
   // Not set: on a terminal, repeat the last second until Ctrl-C; else run 5 s.
   std::optional<Milliseconds> duration;
-  // Used if the interface reports no bit rate, such as a virtual bus.
+  // If the interface (such as a virtual bus) reports no bit rate, this rate is used.
   std::optional<std::uint32_t> bit_rate;       // default 1 Mbit/s
   std::optional<std::uint32_t> data_bit_rate;  // CAN FD only; none: frames do not switch the rate
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Joins recorded CAN frames to datagrams, as boards and hosts do (docs/reference/can.md).
-// Only listens, in the recording's time. Memory is bounded by max_interfaces for any input.
+// Only listens. Times are the recording's. Memory is bounded by max_interfaces for any input.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ class BusTransfers {
 
   struct Place {
     std::uint64_t line = 0;
-    std::uint64_t offset = 0;  // byte in the file
+    std::uint64_t offset = 0;  // position in the file, in bytes
     std::optional<std::uint64_t> time_us;
     std::string date;  // as written, if the log has dates instead of times
   };
@@ -38,7 +38,7 @@ class BusTransfers {
     std::array<std::uint8_t, max_datagram> bytes;
     IsotpReceiver receiver;
     bool answered = false;     // the other end has sent flow control
-    std::uint32_t frames = 0;  // of the transfer so far
+    std::uint32_t frames = 0;  // frames of the transfer so far
     Place first, last;
   };
   class Handler {

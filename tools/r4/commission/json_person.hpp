@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A person who answers through a script: JSON lines of questions on stdout, of answers on stdin.
 //     {"type":"question","check":"osmc 1","topic":"which","text":…,"answer":"choice","choices":[…]}
-//         {"answer":"osmc 1"}   of a choice; a number; true or false
+//         {"answer":"osmc 1"}   a choice, a number, or true or false
 //         {"action":"skip"}     or repeat, leave: to any question, and in place of the key
 //     {"type":"movement","check":"osmc 1","text":…,"command":"O:410,0,1","milliseconds":500}
 //         {"key":true}          something may move, until {"key":false} or the end of the input
@@ -24,7 +24,7 @@ class JsonPerson final : public commissioning::Person {
   bool holds_key() override;
 
  private:
-  // The next line as an object; null if no line came in time; at the end: {"action":"leave"}.
+  // The next line as an object; null: no line arrived in time; at the end: {"action":"leave"}.
   Json next_line(std::chrono::milliseconds timeout);
 
   Keyboard keyboard_;

@@ -13,7 +13,7 @@ namespace r4::tool {
 
 class Keyboard {
  public:
-  static constexpr int nothing = -1;  // no byte came in time
+  static constexpr int nothing = -1;  // no byte arrived in time
   static constexpr int ended = -2;
   static constexpr std::chrono::hours a_while{1};
 

@@ -17,8 +17,8 @@ using namespace std::chrono_literals;
 using commissioning::Answer;
 using commissioning::Question;
 
-constexpr auto repeat_within = 150ms;     // between two repeats
-constexpr auto first_repeat_within = 1s;  // after the key was pressed
+constexpr auto repeat_within = 150ms;     // longest time between two repeats
+constexpr auto first_repeat_within = 1s;  // longest time after the key was pressed
 
 std::optional<Answer> action_of(int key) {
   Answer answer;

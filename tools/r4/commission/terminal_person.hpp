@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A person at a terminal with a keyboard. A terminal reports no release of a key, only its repeats.
-// So the space bar counts as held from its first repeat until no repeat comes for 150 ms.
+// So the space bar counts as held from its first repeat until no repeat arrives for 150 ms.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asks a board on a CAN bus for its identity if no other host is heard, as all get the answer.
+// If no other host is heard on a CAN bus, requests a board's identity: all hosts get the answer.
 #pragma once
 
 #include <asio/io_context.hpp>

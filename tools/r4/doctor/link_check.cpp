@@ -24,11 +24,11 @@ constexpr double much_loss = 0.10;
 constexpr double some_loss = 0.005;
 // 1.5 periods of a state at 100 Hz.
 constexpr double much_jitter_us = 15000;
-// For a virtual bus without a bit rate.
+// Replaces the missing bit rate of a virtual bus.
 constexpr std::uint32_t doctor_bit_rate = 1'000'000;
 // A board does not execute older commands.
 constexpr double slow_answer_us = 250'000;
-// A board asked for this long had time to answer.
+// Within this time a board can answer a question.
 constexpr double asked_for_s = 1;
 
 Finding found(const std::string& url, Severity severity, const char* check, std::string reason,

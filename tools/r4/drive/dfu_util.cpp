@@ -79,7 +79,7 @@ int run_dfu_util(std::vector<const char*> arguments,
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 
-// The bar "Download	[=====     ]  20%        24576 bytes" comes after a bar "Erase".
+// The bar "Download	[=====     ]  20%        24576 bytes" follows a bar "Erase".
 class Progress {
  public:
   explicit Progress(const std::function<void(int)>& on_percent) : on_percent_(on_percent) {}

@@ -9,7 +9,7 @@
 namespace r4::tool {
 
 struct BootLoaders {
-  std::vector<std::string> usb_paths;  // of boot loaders that this user may open: "1-2"
+  std::vector<std::string> usb_paths;  // boot loaders that this user may open: "1-2"
   bool denied = false;                 // this user may not open a boot loader
 };
 // Throws Error{unsupported} if dfu-util is not installed.

@@ -94,7 +94,7 @@ std::optional<Milliseconds> setting_of(const Order& order, std::string_view key)
   return Milliseconds(number_in<std::uint32_t>({value.data(), value.size()}).value_or(0));
 }
 
-// Sent in one step, because the board may refuse one setting without the other.
+// Both settings are sent in one step, because the board may refuse one setting alone.
 struct LinkTiming {
   Milliseconds timeout{0};
   Milliseconds heartbeat{0};

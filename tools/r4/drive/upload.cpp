@@ -138,7 +138,7 @@ class Port {
     std::this_thread::sleep_for(held);
     ::ioctl(number_, TIOCMBIC, &ready);  // even if a program has set the port to keep the line
   }
-  // The USB path of the port's device, as dfu-util names it: "1-2". Empty if it is not on USB.
+  // The USB path of the port's device, as dfu-util names it: "1-2". Empty: no USB port.
   std::string usb_path() const {
     std::error_code ignored;
     const auto device = std::filesystem::canonical(path_, ignored);  // path_ may be a link

@@ -29,7 +29,7 @@ class BusRecords final : BusTransfers::Handler {
                 const BusTransfers::Place& place);
   void finish();
   bool told() const { return told_; }
-  // Reports a path and returns its number. Also for paths of the recording that are not on CAN.
+  // Reports a path and returns its number. Call also for paths that are not on CAN.
   std::uint16_t add_path(const std::string& url);
 
  private:

@@ -37,7 +37,7 @@ class Output {
 class Sink {
  public:
   virtual ~Sink() = default;
-  // True if survey() should get the whole recording first, which needs an input to read twice.
+  // True if survey() should get the whole recording first, for which the input is read twice.
   virtual bool wants_survey() const { return false; }
   virtual void survey(const RecordedPath& path) { static_cast<void>(path); }
   virtual void survey(const RecordedDevice& device) { static_cast<void>(device); }

@@ -12,7 +12,7 @@ namespace r4::tool {
 std::string page_name(const CLI::App& root, const CLI::App& command);
 
 // The page of `command`, which is `root` or its subcommand. Examples and exit codes of the help's
-// footer become sections. Dated by SOURCE_DATE_EPOCH, else today.
+// footer become sections. The date is SOURCE_DATE_EPOCH, else today.
 std::string man_page(const CLI::App& root, const CLI::App& command);
 
 }  // namespace r4::tool

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Detects a file's format by its content: native recording, candump log, capture or MCAP, each also
-// compressed by zstd. The name decides only if the first 64 KiB do not.
+// compressed by zstd. If the first 64 KiB do not decide, the name decides.
 #pragma once
 
 #include <cstddef>

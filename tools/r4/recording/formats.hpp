@@ -14,7 +14,7 @@
 
 namespace r4::tool {
 
-// Damaged places reported one by one; more are only counted.
+// Damaged places reported one by one. Further places are only counted.
 constexpr std::size_t most_damage = 20;
 
 // The name for messages; "-" is standard input.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Subscriptions and services of a board: R4_Command, a topic for each output, cmd_vel, stop, arm.
 // Runs on the boards' loop. Sends the newest setpoint of each channel, in as few datagrams as
-// possible. Drops a sample without a link or, except a stop, after 250 ms. A lost link ends arm().
+// possible. Without a link, drops samples. Drops a sample after 250 ms, but not a stop. A lost link
+// ends arm().
 #pragma once
 
 #include <asio/cancellation_signal.hpp>
@@ -39,7 +40,7 @@ class BoardCommands {
   void on_tick();
   using Done = std::function<void(bool done, const std::string& text)>;
   void arm(Done done);
-  // Arms once the board is connected, unless a stop came before.
+  // If no stop arrives before, arms when the board is connected.
   void arm_at_first();
 
   std::uint64_t stale() const { return stale_; }

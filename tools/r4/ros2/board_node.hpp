@@ -38,7 +38,7 @@ class BoardNode {
   void start();
   void flush() { commands_.flush(); }
   void warn(const std::string& text) { log(LogLevel::warning, text); }
-  // `who` is a foreign reader or writer. Without a `mismatch` it matches our endpoint or has left.
+  // `who` is a foreign reader or writer. No `mismatch`: `who` matches our endpoint or has left.
   void on_mismatch(const EntityId& who, const std::optional<Mismatch>& mismatch);
   AsyncBoard& board() { return board_; }
   const std::string& name() const { return name_; }

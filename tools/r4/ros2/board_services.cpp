@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Services of a board. Each answers after the board's confirmation, or with a failure's reason.
+// Services of a board: each answers after the board's confirmation, or with a failure's reason.
 #include <fmt/format.h>
 
 #include <algorithm>

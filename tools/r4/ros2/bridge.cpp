@@ -75,7 +75,7 @@ struct NamedUrl {
   NodeName name;
 };
 
-// One board is in the namespace itself. Several boards are below it: board1 …, or pattern numbers.
+// One board is in the namespace itself. Several boards are below, as board1 …, or pattern numbers.
 std::vector<NamedUrl> named_urls(const BridgeOptions& options) {
   const std::vector<PatternUrl> urls = expand_urls(options.urls);
   const bool numbered = options.urls.size() == 1;
@@ -113,7 +113,7 @@ const char* level_text(LogLevel level) {
   }
 }
 
-constexpr std::size_t jobs_a_board = 256;  // that may wait to be published
+constexpr std::size_t jobs_a_board = 256;  // most jobs that may wait to be published
 
 class Bridge {
  public:

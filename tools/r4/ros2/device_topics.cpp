@@ -16,7 +16,7 @@ double number_of(const Device& device, const State& state, std::string_view valu
   return device.reading(state, value).number.value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
-// The raw value, even out of range. Empty before the first reading, or of another device's slot.
+// The raw value, even out of range. Empty before the first reading, or for another device's slot.
 std::optional<double> any_number_of(const Device& device, const State& state, std::size_t value) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   DeviceValue any = device.description().values[value];

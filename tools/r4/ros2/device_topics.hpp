@@ -25,7 +25,7 @@ class DeviceTopics {
  private:
   struct Topic {
     Device device;
-    std::string name;  // of device, frame and joint; with the address if not unique
+    std::string name;  // name of device, frame and joint; with the address if not unique
     dds_entity_t writer = 0;
     std::size_t value = 0;  // index of the main value
     std::optional<std::uint32_t> t_ms;

@@ -42,13 +42,13 @@ class Drivers {
   explicit Drivers(Duration deadline) : deadline_(deadline) {}
 
   static bool rests(const Command& command);
-  // `source`: the topic; `publisher`: of that topic.
+  // `source`: the topic; `publisher`: a publisher of that topic.
   void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
   void on_state(const State& state, Time sampled);
   void on_publishers(const void* source, const std::vector<std::uint64_t>& there);
   // Call when the outputs were made safe otherwise.
   void forget();
-  // Call when the board has no such output.
+  // Call when the board does not have the output of `command`.
   void forget(const Command& command);
 
   // Commands that stop outputs now, at most max_group, repeated until stopped() or a driving

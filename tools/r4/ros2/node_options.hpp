@@ -20,9 +20,9 @@ struct NodeOptions {
   std::optional<double> counts_per_turn;     // for encoder joints; none: no joints
   std::optional<double> steps_per_turn;      // for stepper joints
   std::optional<DifferentialDrive> drive;    // none: no cmd_vel
-  std::chrono::milliseconds deadline{1000};  // of a publisher that drives
+  std::chrono::milliseconds deadline{1000};  // longest silence of a publisher that drives
   std::vector<Device> devices;
-  bool arm = false;        // once, when the board is connected
+  bool arm = false;        // arms once, when the board is connected
   bool one_clock = false;  // all publishers are on this computer, so stamps use its clock
 };
 

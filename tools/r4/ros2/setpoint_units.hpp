@@ -15,7 +15,7 @@
 
 namespace r4::tool::ros2 {
 
-// From -1 (full reverse) to 1.
+// The duty from -1 (full reverse) to 1.
 double to_duty(int pwm, Direction direction);
 
 // Unit of servo topics: radians by a calibration; none: pulses in microseconds.
@@ -23,7 +23,7 @@ using ServoUnit = std::optional<ServoCalibration>;
 // "us", or two pulses and the angle between them: "500,2500,3.14". Throws Error{usage}.
 ServoUnit servo_unit(std::string_view text);
 std::optional<Microseconds> to_pulse(const ServoUnit& unit, double value);
-// In radians: NaN for a disabled servo.
+// The angle in radians: NaN for a disabled servo.
 double from_pulse(const ServoUnit& unit, int pulse_us);
 
 // A motor channel, possibly mounted in reverse: "osmc1", "-dhb12_3".
@@ -38,7 +38,7 @@ struct DifferentialDrive {
   MotorChannel left;
   MotorChannel right;
   double separation_m = 0;    // between the wheels
-  double full_speed_mps = 0;  // of a wheel at duty 1
+  double full_speed_mps = 0;  // speed of a wheel at duty 1
   // Empty for NaN. `linear`: m/s ahead; `angular`: rad/s to the left.
   std::optional<Setpoints> setpoints(double linear, double angular) const;
 };
@@ -61,7 +61,7 @@ class Position {
 using WallTime = std::chrono::system_clock::time_point;
 // The time of a header's stamp; empty for 0.
 std::optional<WallTime> stamp_time(std::int32_t seconds, std::uint32_t nanoseconds);
-// True if the stamp is older than `deadline`; 0: no deadline. Both times are of the same clock.
+// True if the stamp is older than `deadline`; 0: no deadline. Both times are from the same clock.
 bool is_outdated(const std::optional<WallTime>& stamp, WallTime now,
                  std::chrono::milliseconds deadline);
 

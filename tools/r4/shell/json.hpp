@@ -28,7 +28,7 @@ Json bad_datagram_json(const ReadResult& result);
 // Adds `ok`; `type`, `pnum`, `t` and `fields`, or `error` and its position; `text`. True if valid.
 bool add_datagram_json(Json& object, std::string_view bytes);
 
-// {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}; of a command also "outcome" and "code".
+// {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}; for a command also "outcome" and "code".
 Json problem_json(const Problem& problem);
 
 // {"wrong_sequence":…,"timed_out":…,"overflow":…,"interrupted":…,"cancelled":…,"unexpected":…,

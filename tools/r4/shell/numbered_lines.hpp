@@ -16,7 +16,7 @@ namespace r4::tool {
 
 class NumberedLines {
  public:
-  // Calls line() for each complete line that is not empty, too_long() above max_datagram.
+  // Calls line() for each complete line that is not empty, or too_long() above max_datagram.
   template <class Line, class TooLong>
   void push(std::string_view bytes, Line line, TooLong too_long) {
     while (!bytes.empty()) {

@@ -21,7 +21,7 @@ namespace r4::tool {
 // Applies printable() to each line, because text for people may contain foreign names.
 std::string printable_lines(std::string_view text);
 
-// Prints printable_lines(text). Blocks until the reader takes it.
+// Prints printable_lines(text). Blocks until the reader takes the text.
 void print_text(std::string_view text);
 template <class First, class... Rest>
 void print_text(fmt::format_string<First, Rest...> format, First&& first, Rest&&... rest) {
@@ -35,7 +35,7 @@ void print_trouble(fmt::format_string<First, Rest...> format, First&& first, Res
   print_trouble(fmt::format(format, std::forward<First>(first), std::forward<Rest>(rest)...));
 }
 
-// Throws Error if a write failed. Call it when no LineWriter is left.
+// Throws Error if a write failed. Call when no LineWriter is left.
 void require_output();
 
 // Writes lines in a thread, for a loop that must not wait for the reader: a full pipe or a stopped

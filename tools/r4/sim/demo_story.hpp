@@ -24,7 +24,7 @@ struct StoryResult {
   double round_trip_us = 0;
   double confirmed_ms = 0;
   double safe_ms = 0;          // from the host's last heartbeat to the safe state
-  bool safe_by_event = false;  // measured by the board's own log, else by T of its datagrams
+  bool safe_by_event = false;  // measured by the board's own log, else by T of the datagrams
   double recovered_ms = 0;
   double stop_ms = 0;
   bool good = false;
@@ -32,7 +32,7 @@ struct StoryResult {
 };
 
 struct BoardLog {
-  std::optional<std::uint32_t> silence_ms;  // of the newest SAFE (link)
+  std::optional<std::uint32_t> silence_ms;  // silence before the newest SAFE (link)
   bool outputs_off = false;
 };
 
@@ -43,7 +43,7 @@ class Story {
     std::function<void(std::string_view)> show;
   };
 
-  // `log` may be null; else handlers of `io` must update it.
+  // If `log` is not null, handlers of `io` must update the log.
   Story(asio::io_context& io, const std::string& url, const BoardLog* log, Teller teller);
 
   StoryResult run();

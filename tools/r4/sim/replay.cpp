@@ -41,7 +41,7 @@ struct ReplayOptions {
 
 // Records or file pieces handled before other work of the loop runs.
 constexpr int steps_in_a_turn = 32;
-// Limits of the audience: a peer silent for that long is removed.
+// Limits of the audience: a peer silent for this time is removed.
 constexpr std::chrono::seconds audience_for{2};
 constexpr std::size_t most_peers = 8;
 

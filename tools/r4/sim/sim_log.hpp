@@ -34,7 +34,7 @@ class SimOutput {
 
 class SimLog {
  public:
-  // `name` is part of each event if there are several boards; else empty.
+  // For several boards, `name` is part of each event. Otherwise `name` is empty.
   SimLog(SimOutput& output, bool quiet, std::string name)
       : output_(output), quiet_(quiet), name_(std::move(name)) {}
 

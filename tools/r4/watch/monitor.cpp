@@ -34,8 +34,8 @@ constexpr Milliseconds tick{100};
 constexpr Milliseconds table_interval{1000};
 // With --count only: the longest silence of the boards after the start.
 constexpr Milliseconds patience{5000};
-// With --device: how long another host must control the board until this program releases it, and
-// how long the board may take to confirm the release.
+// With --device. After another host has controlled the board for busy_patience, this program
+// releases the board. The board has release_time to confirm the release.
 constexpr Milliseconds busy_patience{1500}, release_time{200};
 // Bytes that wait for a reader. For one board: about half a second of states.
 constexpr std::size_t unread_of_board = 32768, most_unread = std::size_t{1} << 18;

@@ -16,7 +16,7 @@ struct BusMonitorOptions {
   std::optional<Milliseconds> duration;
 };
 
-// Runs until its end or a signal. Throws Error{refused} if no board was heard.
+// Ends by `count`, `duration` or a signal. Throws Error{refused} if no board was heard.
 void monitor_bus(const BusMonitorOptions& options);
 
 }  // namespace r4::tool

@@ -44,7 +44,7 @@ class MonitorView {
   virtual void on_link(const LinkStatus&) {}
   virtual void on_event(const CarrierEvent&) {}
   virtual void on_path(const PathStatus&) {}
-  // Ten times a second.
+  // Called ten times a second.
   virtual void on_tick() {}
 };
 

@@ -32,7 +32,7 @@ class Foxglove {
 
   // Sets a board's name, new or changed, and advertises its topics again.
   void name(std::size_t board, const std::string& name);
-  // True if a client is subscribed. From any thread.
+  // True if a client is subscribed. Call from any thread.
   bool wanted(std::size_t board, Topic topic) const {
     return channel(board, topic).subscribers > 0;
   }

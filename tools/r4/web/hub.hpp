@@ -30,7 +30,7 @@ struct HubOptions {
 
 class Hub final : ServerEvents, WebBoard::Events {
  public:
-  // The boards, not yet open, must outlive the hub. Throws Error if it cannot listen.
+  // The boards, not yet open, must outlive the hub. Throws Error if the hub cannot listen.
   Hub(BoardSet& boards, const HubOptions& options);
   ~Hub();
 

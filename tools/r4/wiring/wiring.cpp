@@ -160,7 +160,7 @@ int confirm(const WiringOptions& options) {
 struct WiringAction {
   std::string_view name;
   std::string_view arguments;
-  int count;  // of the arguments
+  int count;  // number of arguments
   int (*run)(const WiringOptions&);
 };
 constexpr WiringAction actions[] = {

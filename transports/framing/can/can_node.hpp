@@ -45,17 +45,17 @@ class CanNode {
 
   CanLane lane_of(Text datagram) const;
   bool idle(CanLane lane) const;
-  // Copies a datagram. False without effect if its lane is busy, or the datagram empty or too long.
+  // Copies a datagram. False without effect if the lane is busy, or the datagram empty or too long.
   bool begin(Text datagram, std::uint32_t now_us);
 
   // Writes the most urgent frame, until frame_sent() or a more urgent frame. False if none.
   bool offer(std::uint32_t now_us, CanFrame& frame);
-  // As offer(), but only frames that may overtake: flow control, and the reason for going safe.
+  // Like offer(), but only frames that may overtake: flow control, and the reason for going safe.
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
   void frame_sent(std::uint32_t now_us);
   // True for a frame of this end's dialogue, which the other end answers with flow control.
   bool may_be_answered(const CanFrame& frame) const;
-  // Restarts the wait for these answers, because the frames wait for the bus or just reached it.
+  // Restarts the wait for flow control: the frames wait for the bus, or just reached the bus.
   void wait_anew(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
   // Returns the datagram that the frame completes, valid until the next call; otherwise empty.
   Text on_frame(const CanFrame& frame, std::uint32_t now_us);
@@ -109,7 +109,7 @@ class CanNode {
   IsotpReceiver telemetry_in_;
 
   Offered offered_ = Offered::nothing;
-  SafeReason reason_ = SafeReason::none;  // of the newest heartbeat
+  SafeReason reason_ = SafeReason::none;  // reason in the newest heartbeat
   bool reason_due_ = false;
   bool request_due_ = false;
   CanNodeCounters counters_;

@@ -44,7 +44,7 @@ struct IsotpReceiverOptions {
   // Long: the sender or the report of an arrival may be late. A first frame ends a transfer anyway.
   std::uint32_t n_cr_us = 100000;
   std::uint16_t max_waits = 10;       // N_WFTmax: waits in a row while hold(true)
-  std::uint32_t wait_gap_us = 10000;  // between waits: less than the sender's N_Bs
+  std::uint32_t wait_gap_us = 10000;  // gap of waits: less than the sender's N_Bs
 };
 
 // started == datagrams + busy() + the errors that end a transfer
@@ -126,7 +126,7 @@ class IsotpReceiver {
   std::uint16_t waits_ = 0;
   bool held_ = false;
   State state_ = State::idle;
-  IsotpFlowStatus status_ = IsotpFlowStatus::clear_to_send;  // of the flow control that is owed
+  IsotpFlowStatus status_ = IsotpFlowStatus::clear_to_send;  // status of the owed flow control
   IsotpReceiverCounters counters_;
 };
 

@@ -65,7 +65,7 @@ class IsotpSender {
   }
   bool busy() const { return state_ != State::idle; }
   bool awaits_flow_control() const { return state_ == State::waiting; }
-  // The error that ended the last transfer; `none` during a transfer and after a complete one.
+  // The error that ended the last transfer; `none` during a transfer and after a complete transfer.
   IsotpError error() const { return error_; }
 
   // Writes the frame to send; false if there is none. Constant time.

@@ -47,7 +47,7 @@ class DigitWriter {
  private:
   std::uint8_t* at_;
   std::uint8_t* end_;
-  std::uint64_t pending_ = 0;  // its last `count_` digits are not yet written
+  std::uint64_t pending_ = 0;  // the last `count_` digits are not yet written
   unsigned count_ = 0;
 };
 

@@ -22,7 +22,7 @@ enum class Layout : std::uint8_t {
   of_session,       // more, SID, PNum: a command
 };
 
-constexpr std::uint8_t version_bits = 0x80;  // of version 1
+constexpr std::uint8_t version_bits = 0x80;  // bits of version 1
 constexpr std::uint8_t version_mask = 0xC0;
 
 constexpr unsigned default_fields = code_servo1pos + 1;
@@ -61,12 +61,12 @@ constexpr Sizes sizes_of(Layout layout, unsigned size) {
   return layout == Layout::of_session ? session_sizes : sizes[size];
 }
 
-constexpr unsigned digit_escape = 0xF;  // in place of a value: text follows
+constexpr unsigned digit_escape = 0xF;  // replaces a value: text follows
 // Text: 0-9 are themselves.
 constexpr unsigned digit_point = 0xA;
 constexpr unsigned digit_minus = 0xB;
 constexpr unsigned digit_comma = 0xC;
-constexpr unsigned digit_end = 0xD;    // of the field
+constexpr unsigned digit_end = 0xD;    // end of the field
 constexpr unsigned digit_bytes = 0xE;  // a count (1-15), then that many bytes
 constexpr unsigned digit_word = 0xF;   // then a code of two digits
 // A name: a code of two digits, the first at most D; or E, a count (1-14), that many bytes.

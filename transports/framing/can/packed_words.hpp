@@ -24,7 +24,7 @@ enum class PackedForm : std::uint8_t {
 
 struct PackedWord {
   char text[14] = {};  // followed by a colon, as in a field
-  std::uint8_t size;   // of the word without the colon
+  std::uint8_t size;   // size of the word without the colon
   PackedForm form;
 
   template <std::size_t N>

@@ -37,7 +37,7 @@ class Digits {
 
  private:
   const std::uint8_t* bytes_;
-  std::size_t size_;  // in digits
+  std::size_t size_;  // number of digits
   std::size_t at_ = 0;
 };
 

@@ -16,7 +16,7 @@ struct OwnAddress {
 // Empty if the system does not report its addresses.
 std::vector<OwnAddress> own_addresses();
 
-// 0 if there is a route to `to`, else errno. `from`, if specified: only by its interface.
+// 0 if there is a route to `to`, else errno. If `from` is specified: only by its interface.
 int probe_route(const asio::ip::udp::endpoint& to, const asio::ip::address& from,
                 const std::vector<OwnAddress>& own);
 

@@ -32,7 +32,7 @@ struct AnsweredBoard : IdentityAnswer {
 struct BoardSearch {
   struct Network {
     std::string interface;
-    unsigned index = 0;  // of the interface; 0: as the system routes it
+    unsigned index = 0;  // index of the interface; 0: as the system routes
     asio::ip::address_v4 from;
     asio::ip::address_v4 to;   // the broadcast address
     std::string trouble = {};  // why the question could not be sent
@@ -52,15 +52,15 @@ struct BoardSearch {
   static constexpr std::size_t most_boards = Discovery::most_answers;
 
   std::function<std::vector<Network>()> networks = networks_of_this_computer;
-  std::uint16_t port = DiscoveryOptions().udp_port;  // at which boards listen
+  std::uint16_t port = DiscoveryOptions().udp_port;  // port at which boards listen
   int questions = 3;
   std::chrono::milliseconds between{120};
   std::chrono::milliseconds patience{500};
 };
 
 struct WantedBoard {
-  std::string called;    // its board id, or its name; empty: the only board
-  std::string board_id;  // of the board that was found before; empty: none
+  std::string called;    // the board's id or name; empty: the only board
+  std::string board_id;  // id of the board that was found before; empty: none
 };
 
 // The boards with that id; if there is none, the boards with that name.

@@ -21,7 +21,7 @@ namespace r4 {
 struct FoundHost {
   std::vector<asio::ip::address> addresses;
   std::string reason;  // why there are no addresses
-  // Of a search for boards (board_search.hpp):
+  // Results of a search for boards (board_search.hpp):
   std::string board_id = {};
   std::optional<Problem> problem = {};  // why no board can be chosen; its thing is empty
 };
@@ -34,7 +34,7 @@ struct HostLookup {
   Resolve resolve = ask_system;
   std::chrono::milliseconds patience{5000};  // find() waits that long for an answer
   std::chrono::milliseconds retry{1000};     // from a failed question to the next
-  std::chrono::milliseconds silence{3000};   // of a board, after which it is looked up again
+  std::chrono::milliseconds silence{3000};   // silence before a board is looked up again
 
   // `host`: a name or an address. Blocks, at most for `patience`. Throws Error about `thing`.
   asio::ip::address find(const std::string& host, const std::string& thing) const;
@@ -46,7 +46,7 @@ asio::ip::address address_of(const FoundHost& found, const std::string& host,
 
 bool is_address(const std::string& host);
 
-// Asks for a board's address until it is known, and again when the board is silent.
+// Requests a board's address until it is known, and again when the board is silent.
 class HostWatch {
  public:
   HostWatch(asio::io_context& io, HostLookup lookup);
@@ -56,11 +56,11 @@ class HostWatch {
 
   using Question = std::function<FoundHost()>;  // blocks; called in a separate thread
   using OnFound = std::function<void(const FoundHost&)>;
-  // Calls `on_found`, on the loop, with each answer. Asks at once unless the address is `known`.
+  // Calls `on_found`, on the loop, with each answer. If the address is not `known`, asks at once.
   // Without a question, `on_found` gets an empty answer when the board is silent.
   void start(Question question, bool known, OnFound on_found);
   void ask_for(Question question) { what_to_ask_ = std::move(question); }
-  // No call follows. An open question continues in its thread, and its answer is dropped.
+  // No call follows. An open question continues in its thread, and the answer is dropped.
   void stop();
 
   void set_known(bool known) { known_ = known; }

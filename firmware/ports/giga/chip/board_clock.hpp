@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Microseconds of the core's timer, also in interrupts and fault handlers, wrap after 71 minutes.
-// The timer interrupt derives milliseconds from them, so none is lost; they wrap after 49 days.
+// From microseconds the timer interrupt derives all milliseconds. Milliseconds wrap after 49 days.
 #pragma once
 
 #include <cstdint>

@@ -30,7 +30,7 @@ void guard_against_faults();
 // Call before any output is switched on. A fault then switches off the outputs of `hal`.
 void guard_outputs(firmware::Hal& hal);
 
-// From any thread. If the boot ends meanwhile, the boot's note has in_store.
+// Call from any thread. If the boot ends meanwhile, the boot's note has in_store.
 void store_is_starting(bool starting);
 
 // Returns and deletes the note of the last boot.

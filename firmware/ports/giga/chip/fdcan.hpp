@@ -64,7 +64,7 @@ class Fdcan {
   enum class Event : std::uint8_t { none, bus_off, stale };
   // bus_off: the bus was left; stale: nothing was sent for stale_us. Both drop all waiting frames.
   Event poll(std::uint32_t now_us);
-  // Call in the controller's interrupt, which it clears. True: an emergency stop waits in FIFO 1.
+  // Call in the controller's interrupt, to clear it. True: an emergency stop waits in FIFO 1.
   bool on_interrupt();
 
   CanState state() const;

@@ -29,7 +29,7 @@ enum class LinePull : std::uint32_t { none = 0, up = 1, down = 2 };
 // Switches on the clock of all ports. Call first.
 void start_ports();
 Line line_of(Pin pin);
-// A line without a pin: writes have no effect, and it reads low.
+// A line without a pin: writes have no effect, and the line reads low.
 Line unconnected_line();
 
 inline void write(Line line, bool high) {

@@ -16,10 +16,10 @@
 namespace r4 {
 namespace giga {
 
-// Runs `work` on our stack. From an interrupt handler only. Nested handlers share the stack.
+// Runs `work` on our stack. Call from an interrupt handler only. Nested handlers share the stack.
 void on_own_stack(void (*work)());
 
-// Continues with `work` on the last stack and abandons the old stack. From anywhere.
+// Continues with `work` on the last stack and abandons the old stack. Call from anywhere.
 [[noreturn]] void on_last_stack(void (*work)());
 
 // Marks the unused part of both stacks. Call before our first interrupt.

@@ -59,7 +59,7 @@ void on_millisecond() { on_own_stack(&pass_millisecond); }
 
 }  // namespace
 
-// Twice the bus clock, unless the bus runs undivided (RM0399, chapter RCC).
+// If the bus runs undivided: the bus clock. Otherwise: twice the bus clock (RM0399, chapter RCC).
 std::uint32_t timer_input_hz() {
   const std::uint32_t bus_hz = HAL_RCC_GetPCLK1Freq();
   return bus_hz == HAL_RCC_GetHCLKFreq() ? bus_hz : 2 * bus_hz;

@@ -5,7 +5,7 @@
 //     a stop   MDIOS_IRQn     the guard; uses the interrupt of an unused peripheral
 //
 // Handlers run on the stack of interrupt_stack.hpp. A 40 kHz Ticker would spend most time in the
-// core's queue. If not fed for starve_ms, the boot ends with a note before the watchdog resets.
+// core's queue. If the watchdog is unfed for starve_ms, the boot ends with a note before the reset.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ class StepTick {  // called in the 40 kHz interrupt
 void start_step_timer(StepTick& tick);
 void start_guard_timer(firmware::Guard& guard);
 
-// For a received E:STOP. From any interrupt or thread, after start_guard_timer().
+// Call for a received E:STOP, from any interrupt or thread, after start_guard_timer().
 void stop_at_once();
 
 std::uint32_t timer_input_hz();  // TIM7's input clock

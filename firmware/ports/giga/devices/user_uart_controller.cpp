@@ -72,14 +72,14 @@ void UserUartController::begin() {
 void UserUartController::move(bool sends) {
   std::uint32_t status = registers_.ISR;
   for (int i = 0; i < bytes_in && (status & has_byte) != 0; ++i) {
-    // Clear the flags before the read. After the read they belong to the next byte.
+    // Clear the flags before the read. After the read the flags belong to the next byte.
     if ((status & damaged) != 0) registers_.ICR = damaged;
     const char byte = static_cast<char>(registers_.RDR & 0xFFU);
     if ((status & damaged) != 0 || !received_.put(byte)) lost_ = lost_ + 1;
     status = (status & overrun) | registers_.ISR;
   }
   if ((status & overrun) != 0) {
-    lost_ = lost_ + 1;  // at least one
+    lost_ = lost_ + 1;  // at least one byte is lost
     registers_.ICR = overrun;
   }
   char next = 0;

@@ -36,7 +36,7 @@ class UserUartController final : public firmware::UserUartPort {
         function_(parts.function) {}
 
   void start(std::uint32_t kernel_hz);  // the peripheral's clock, which must be on
-  // In the step timer's interrupt. `sends`: false until the loop has handled a safe state.
+  // Call in the step timer's interrupt. `sends`: false until the loop has handled a safe state.
   void tick(bool sends) {
     if (runs_) move(sends);
   }

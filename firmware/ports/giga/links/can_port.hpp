@@ -2,7 +2,7 @@
 // The CAN bus as a port of the application (docs/reference/can.md): datagrams over ISO-TP. Two
 // lanes, dialogue and telemetry, each with one transfer at a time. In telemetry, heartbeats come
 // first, then the newest state. A full queue drops and counts new datagrams. When the bus is lost,
-// or stuck for Fdcan::stale_us, all waiting datagrams are dropped. Never waits; from the loop only.
+// or stuck for Fdcan::stale_us, all waiting datagrams are dropped. Never waits. For the loop only.
 #pragma once
 
 #include <cstdint>

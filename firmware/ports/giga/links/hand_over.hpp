@@ -26,7 +26,7 @@ class HandOver {
     version_.store(before + 2, std::memory_order_release);
   }
 
-  // Takes a value newer than version `known` (0: none); updates `known`. False if there is none.
+  // Takes a value newer than version `known` (0: none); updates `known`. False: no newer value.
   bool take(std::uint32_t& known, T& value) const {
     const std::uint32_t before = version_.load(std::memory_order_acquire);
     if (before == known || before % 2 != 0) return false;

@@ -74,7 +74,7 @@ class Network {
   UdpPeers peers_;
   bool tried_ = false;
   std::uint32_t tried_ms_ = 0;
-  bool heard_ = false;  // a datagram came since the network was joined
+  bool heard_ = false;  // a datagram arrived since the network was joined
   std::uint32_t heard_ms_ = 0;
   UDPSocket socket_;  // non-blocking: the core's WiFiUDP can wait a second to send or to receive
 

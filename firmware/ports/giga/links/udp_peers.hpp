@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The hosts that have sent datagrams, and the receivers of a datagram to everyone, as in
-// udp://BIND?peer=HOST (docs/reference/transports.md). From the network thread only.
+// udp://BIND?peer=HOST (docs/reference/transports.md). Call from the network thread only.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class UdpPeers {
   static constexpr int capacity = 16;
   static constexpr std::uint16_t host_port = 2390;  // where the paper's host program listens
 
-  // This host also gets datagrams to everyone, at host_port; 0: none.
+  // The host at `ip` also gets datagrams to everyone, at host_port; 0: none.
   void set_host(std::uint32_t ip) { host_ = ip; }
 
   // Returns the number of the sender; everyone if `bytes` is not a valid datagram.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// UDP as a port. WiFi may block its thread for seconds, so lock-free rings connect the loop to it.
+// UDP as a port. WiFi may block its thread for seconds, so lock-free rings connect loop and thread.
 //     loop                         network thread
 //     UdpPort::send()     ----->   UdpLink::take()     skips states older than stale_ms
 //     UdpPort::receive()  <-----   UdpLink::give()

@@ -20,19 +20,19 @@ namespace giga {
 
 class UsbPort final : public firmware::Port {
  public:
-  // A full packet, the most that the core takes at a time. Another packet must follow it.
+  // The most that the core takes at a time. Another packet must follow a packet of this size.
   static constexpr std::uint32_t packet_size = 64;
 
-  // Per receive(), so that a flood of input does not delay the board.
+  // The limit of one receive(), so that a flood of input does not delay the board.
   static constexpr int packets_per_turn = 8;
 
   static constexpr std::uint32_t receive_capacity = 1024;
 
   // Makes the core call listen() for each packet.
   static void start();
-  // Requests the interrupt for take_in(): SWPMI1_IRQn, otherwise unused. From anywhere.
+  // Requests the interrupt for take_in(): SWPMI1_IRQn, otherwise unused. Call from anywhere.
   static void listen();
-  // Call in that interrupt. True: E:STOP was received.
+  // Call in the interrupt of listen(). True: E:STOP was received.
   bool take_in();
   bool has_received() const { return !received_.empty(); }
 

@@ -30,7 +30,7 @@ class BoardClock {
   }
   static void on_wake_interrupt() { at(timer1_base + interrupt) = 1; }
 
-  // Also in interrupts. Call more often than every 171 s, before the timer wraps.
+  // May be called in interrupts. Call more often than every 171 s, before the timer wraps.
   std::uint32_t now_ms() {
     const InterruptsHeld held;
     advance();
@@ -50,7 +50,7 @@ class BoardClock {
   static constexpr std::uint32_t value = 0x4;
   static constexpr std::uint32_t reload = 0x8;
   static constexpr std::uint32_t interrupt = 0xC;
-  static constexpr std::uint32_t on = 1;  // in control
+  static constexpr std::uint32_t on = 1;  // bit of `control`
   static constexpr std::uint32_t with_interrupt = 8;
 
   static constexpr std::uint32_t ticks_per_ms = clock_hz / 1000;

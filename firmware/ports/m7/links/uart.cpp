@@ -16,14 +16,14 @@ constexpr std::uint32_t control = 0x08;
 constexpr std::uint32_t interrupt = 0x0C;  // a 1 clears
 constexpr std::uint32_t baud_divider = 0x10;
 
-constexpr std::uint32_t transmit_full = 1;  // in state
+constexpr std::uint32_t transmit_full = 1;  // bit of `state`
 constexpr std::uint32_t receive_full = 2;
 constexpr std::uint32_t overrun = 8;
-constexpr std::uint32_t transmit_on = 1;  // in control
+constexpr std::uint32_t transmit_on = 1;  // bit of `control`
 constexpr std::uint32_t receive_on = 2;
 constexpr std::uint32_t transmit_interrupt_on = 4;
 constexpr std::uint32_t receive_interrupt_on = 8;
-constexpr std::uint32_t transmit_interrupt = 1;  // in interrupt
+constexpr std::uint32_t transmit_interrupt = 1;  // bit of `interrupt`
 constexpr std::uint32_t receive_interrupt = 2;
 
 constexpr std::uint32_t baud = 1000000;

@@ -24,7 +24,7 @@ class Uart final : public firmware::Port {
   void on_receive_interrupt();
   void on_transmit_interrupt();
   void on_byte(char byte);
-  // True if a stop came since the last call. Call it in the receive interrupt.
+  // True if a stop has arrived since the last call. Call in the receive interrupt.
   bool take_stop() {
     const bool stop = stop_;
     stop_ = false;

@@ -44,7 +44,7 @@ std::uint32_t fold(std::uint32_t total) {
   return ~total & 0xFFFF;
 }
 
-// Over UDP header, data and IP pseudo header (RFC 768).
+// The checksum over UDP header, data and IP pseudo header (RFC 768).
 std::uint32_t udp_checksum(const std::uint8_t* ip_header, const std::uint8_t* udp,
                            std::size_t size) {
   const std::uint32_t pseudo =

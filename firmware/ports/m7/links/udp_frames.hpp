@@ -41,7 +41,7 @@ class UdpFrames {
   struct Arrival {
     UdpAddress from;             // host 0: no datagram
     Text datagram;               // in the frame
-    std::size_t reply_size = 0;  // of a frame to send back at once
+    std::size_t reply_size = 0;  // size of a frame to send back at once
   };
   // `frame` without its check sequence. `reply` has room for min_frame bytes.
   Arrival take(const std::uint8_t* frame, std::size_t size, std::uint8_t* reply);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// UDP over the LAN9118. Datagrams to everyone go to the controlling host, or the host heard last.
+// UDP over the LAN9118. Datagrams for all go to the controlling host, else to the host heard last.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ class UdpPort final : public firmware::Port {
     return true;
   }
 
-  // Takes received frames. In the interrupt, or with interrupts off.
+  // Takes received frames. Call in the interrupt, or with interrupts off.
   void on_interrupt() {
     Lan9118::on_interrupt();
     while (put_ - taken_ < frames_max && chip_.has_received()) {
@@ -34,7 +34,7 @@ class UdpPort final : public firmware::Port {
       put_ = put_ + 1;
     }
   }
-  // True if a stop came since the last call. In the interrupt.
+  // True if a stop has arrived since the last call. Call in the interrupt.
   bool take_stop() {
     const bool stop = stop_;
     stop_ = false;

@@ -42,7 +42,7 @@ class I2cProcessor {
  public:
   virtual std::uint32_t hold_interrupts() = 0;
   virtual void release_interrupts(std::uint32_t before) = 0;
-  // The wire was busy for `ns`; interrupts may come.
+  // The wire was busy for `ns`; interrupts may occur.
   virtual void wait(std::uint32_t ns) = 0;
 
  protected:
@@ -53,7 +53,7 @@ class I2cBusModel final : public firmware::I2cBus {
  public:
   static constexpr std::uint64_t clock_ns = 2500;  // 400 kHz
   static constexpr int max_chips = 8;
-  static constexpr int max_errors = 8;  // of each kind at once
+  static constexpr int max_errors = 8;  // most pending errors of each kind
 
   // Powers the chip on. The chip must outlive the bus. False if there are max_chips already.
   bool attach(I2cChipModel& chip);
@@ -73,7 +73,7 @@ class I2cBusModel final : public firmware::I2cBus {
   void advance(std::uint64_t us);
   std::uint32_t transfers() const { return transfers_; }
 
-  // `after_bytes`: of data; 0: the address itself. False if max_errors of its kind are pending.
+  // `after_bytes`: accepted bytes of data; 0: the address itself. False if max_errors are pending.
   bool refuse(std::uint8_t address, std::size_t after_bytes = 0, int times = 1);
   // A chip holds SDA: transfers time out until `recoveries` calls of recover().
   void hold(int recoveries = 1);
@@ -115,8 +115,8 @@ class I2cBusModel final : public firmware::I2cBus {
   I2cChipModel* chips_[max_chips] = {};
   int chip_count_ = 0;
   ChipSet disconnected_ = 0;
-  ChipSet addressed_ = 0;    // by the last START
-  ChipSet taking_part_ = 0;  // since the last STOP
+  ChipSet addressed_ = 0;    // chips addressed by the last START
+  ChipSet taking_part_ = 0;  // chips that took part since the last STOP
   Refusal refusals_[max_errors];
   Reset resets_[max_errors];
   std::size_t hold_after_ = 0;  // 0: never

@@ -29,7 +29,7 @@ class Mcp23017Model final : public I2cChipModel {
   explicit Mcp23017Model(std::uint8_t address) : address_(address) {}
 
   std::uint8_t driven(int port) const;  // 1: the chip drives the pin
-  std::uint8_t level(int port) const;   // of driven pins; of other pins the outside level
+  std::uint8_t level(int port) const;   // level of driven pins; for other pins the outside level
   std::uint8_t reg(int port, Register number) const;
   void set_outside(int port, std::uint8_t levels);
 

@@ -34,12 +34,12 @@ class Mcp4728Model final : public I2cChipModel {
   const Setting& input(int channel) const { return input_[channel]; }
   const Setting& eeprom(int channel) const { return eeprom_[channel]; }
   void set_eeprom(int channel, const Setting& setting) { eeprom_[channel] = setting; }
-  // At the pin of a chip on 5 V; 0 if powered down.
+  // The voltage at the pin of a chip on 5 V; 0 if powered down.
   std::int32_t microvolts(int channel) const;
   double volts(int channel) const { return microvolts(channel) / 1e6; }
   bool busy() const { return now_ns() < busy_until_ns_; }
   int eeprom_writes() const { return eeprom_writes_; }
-  // The EEPROM is worn out: it keeps its contents.
+  // A worn-out EEPROM keeps its contents.
   void wear_out() { worn_out_ = true; }
 
   void power_on() override;
@@ -62,10 +62,10 @@ class Mcp4728Model final : public I2cChipModel {
   Setting eeprom_[channels];
   bool has_command_ = false;
   std::uint8_t command_ = 0;    // the first byte of the transfer
-  std::uint8_t bytes_[3] = {};  // since the last channel was complete
+  std::uint8_t bytes_[3] = {};  // bytes since the last channel was complete
   std::size_t size_ = 0;
-  int channel_ = 0;        // the next of a fast or sequential write
-  int first_channel_ = 0;  // of a sequential write
+  int channel_ = 0;        // next channel of a fast or sequential write
+  int first_channel_ = 0;  // first channel of a sequential write
   bool general_ = false;
   bool ignoring_ = false;
   int read_at_ = 0;

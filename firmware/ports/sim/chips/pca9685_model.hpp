@@ -49,7 +49,7 @@ class Pca9685Model final : public I2cChipModel {
   std::uint8_t active_[4 * channels] = {};  // LED0_ON_L … as the outputs have them
   std::uint8_t pointer_ = 0;
   Phase phase_ = Phase::idle;
-  bool led_written_ = false;  // since the last STOP
+  bool led_written_ = false;  // an LED register was written since the last STOP
   bool restart_wanted_ = false;
   std::uint64_t awake_since_ns_ = 0;
 };

@@ -87,7 +87,7 @@ void Bno055Model::write_register(std::uint8_t at, std::uint8_t byte) {
     const bool configured = configures();
     registers_[at] = byte & bno_mode_bits;
     if (configured) runs_from_ns_ = now_ns() + bno_leaves_config_ns;
-    if (configures()) {  // 3.3.1: its outputs are 0
+    if (configures()) {  // 3.3.1: the outputs are 0
       for (int each = bno_acc_data; each <= bno_calib_stat; ++each) registers_[each] = 0;
     }
   } else if (at == bno_sys_trigger && (byte & bno_reset) != 0) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A BNO055 by its registers (Bosch BST-BNO055-DS000 rev. 1.8, 3.3, 3.6 and 4): sensors and fusion.
-// In CONFIGMODE its outputs are 0. Only in CONFIGMODE can its other settings be written.
+// In CONFIGMODE the outputs are 0. Other settings can be written only in CONFIGMODE.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ class Bno055Model final : public RegisterDevice {
   void put(int at, std::int32_t value);
   bool configures() const;
 
-  std::uint8_t registers_[page_size];  // of page 0
+  std::uint8_t registers_[page_size];  // registers of page 0
   std::uint8_t page_ = 0;
   std::uint64_t runs_from_ns_ = 0;  // a change of mode takes time
   Motion motion_;

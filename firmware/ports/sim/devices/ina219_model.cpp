@@ -56,7 +56,7 @@ std::uint8_t Ina219Model::read() {
 std::uint16_t Ina219Model::value_of(std::uint8_t at) const {
   constexpr std::int32_t shunt_lsb_uv = 10;
   constexpr std::int32_t bus_lsb_mv = 4;
-  constexpr std::int32_t shunt_end = 32000;  // 320 mV, of the power-on configuration
+  constexpr std::int32_t shunt_end = 32000;  // 320 mV in the power-on configuration
   const std::int32_t shunt_read = shunt_uv_ / shunt_lsb_uv;
   const std::int32_t shunt_value = shunt_read > shunt_end    ? shunt_end
                                    : shunt_read < -shunt_end ? -shunt_end

@@ -31,9 +31,9 @@ class Ina219Model final : public I2cChipModel {
   std::uint16_t configuration_ = 0x399F;
   std::uint16_t calibration_ = 0;
   std::uint8_t pointer_ = 0;
-  std::uint8_t byte_ = 0;  // of the transfer; 0: the pointer or the higher byte
+  std::uint8_t byte_ = 0;  // index in the transfer; 0: the pointer or the higher byte
   std::uint8_t high_ = 0;
-  std::uint16_t latched_ = 0;  // its lower byte is read next
+  std::uint16_t latched_ = 0;  // the lower byte of this value is read next
   std::int32_t bus_mv_ = 12160;
   std::int32_t shunt_uv_ = 125000;  // 1.25 A through 0.1 ohm
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The user's I2C bus of the simulated board: a controller at 100 kHz, the devices, and their
-// faults. A transfer takes as long as on the wire. It reads the devices' values from its beginning.
+// faults. A transfer takes as long as on the wire, and reads the values of its beginning.
 #pragma once
 
 #include <cstdint>
@@ -57,7 +57,7 @@ class UserBusModel final : public firmware::UserI2cPort {
   std::uint64_t ends_ns_ = 0;
   std::uint32_t transfers_ = 0;
   int clocks_ = 0;
-  bool waits_ = false;  // for lines that are not free
+  bool waits_ = false;  // waits for lines that are not free
   Progress result_ = Progress::done;
 };
 

@@ -8,8 +8,8 @@ namespace sim {
 
 namespace {
 
-constexpr std::uint32_t epoch_ms = 100;  // of the GNSS receiver
-constexpr std::uint32_t period_ms = 10;  // of the lidar
+constexpr std::uint32_t epoch_ms = 100;  // period of the GNSS receiver
+constexpr std::uint32_t period_ms = 10;  // period of the lidar
 constexpr int sentences = 5;
 constexpr std::uint32_t thousand = 1000;
 
@@ -118,7 +118,7 @@ void UserUartModel::put_number(std::uint32_t value, int digits) {
   size_ += static_cast<std::size_t>(digits);
 }
 
-// NMEA 0183, of a receiver that does not move.
+// NMEA 0183 sentences of a receiver that does not move.
 void UserUartModel::say_sentence() {
   at_ = size_ = 0;
   const std::uint32_t epoch = now_ms_ / epoch_ms;
@@ -157,7 +157,7 @@ void UserUartModel::say_sentence() {
   put("\r\n");
 }
 
-// A target comes nearer, from 3 m to 1 m, repeatedly.
+// A target approaches from 3 m to 1 m, repeatedly.
 void UserUartModel::say_distance() {
   const std::uint32_t cm = 300 - now_ms_ / period_ms % 200;
   constexpr std::uint32_t strength = 1200;

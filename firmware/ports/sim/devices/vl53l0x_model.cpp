@@ -14,7 +14,7 @@ constexpr std::uint8_t vl_identity[] = {0xEE, 0xAA, 0x10};
 constexpr std::uint8_t vl_single = 1;
 constexpr std::uint8_t vl_back_to_back = 2;
 constexpr std::uint64_t vl_range_ns = 33000000;  // the default timing budget
-// In the result, after the status
+// Offsets in the result, after the status
 constexpr int vl_spads = 2;         // 256ths
 constexpr int vl_signal_rate = 6;   // 128ths of a million counts a second
 constexpr int vl_ambient_rate = 8;  // 128ths of a million counts a second
@@ -38,7 +38,7 @@ void Vl53l0xModel::put(int at, std::int32_t value) {
 void Vl53l0xModel::latch() {
   if (start_ == 0 || now_ns() - ranged_ns_ < vl_range_ns) return;
   ranged_ns_ += (now_ns() - ranged_ns_) / vl_range_ns * vl_range_ns;
-  if (start_ == vl_single) start_ = 0;  // it clears itself
+  if (start_ == vl_single) start_ = 0;  // the register clears itself
   const bool seen = mm_ < no_target;
   result_[0] = static_cast<std::uint8_t>((seen ? vl_range_valid : vl_no_target) << 3);
   put(vl_spads, 20 * 256);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A VL53L0X by its registers (ST DS11555 rev. 4, 3.2; names of ST's API, STSW-IMG005). It measures
-// a distance by time of flight every 33 ms after SYSRANGE_START has begun ranging.
+// A VL53L0X by its registers (ST DS11555 rev. 4, 3.2; names of ST's API, STSW-IMG005). After
+// SYSRANGE_START has begun ranging, the device measures a distance by time of flight every 33 ms.
 #pragma once
 
 #include <cstdint>

@@ -38,9 +38,9 @@ enum Index : std::uint8_t {
   encoder_b = encoder_a + encoder_channels,  // encoder 1 … : the line stays low
   echo = encoder_b + encoder_channels,       // sensor 1 … : the line floats
   relay = echo + ultrasonic_channels,        // relay 1 … : the contact stays open
-  handle = relay + relay_channels,           // its wire is broken
+  handle = relay + relay_channels,           // the handle's wire is broken
   bypass,                                    // relay 1 is not in the motors' supply
-  servos,                                    // they have no supply
+  servos,                                    // the servos have no supply
   store,                                     // the board keeps no settings over a reboot
   count
 };
@@ -58,7 +58,7 @@ class BoardModel {
   static constexpr std::uint32_t stepper_pause_ms = 100;
   static constexpr std::int32_t hand_speed = 1000;  // counts a millisecond
   static constexpr std::int32_t counts_a_turn = 1000;
-  static constexpr int supply_relay = 1;  // its contact is in the motors' supply
+  static constexpr int supply_relay = 1;  // the relay whose contact is in the motors' supply
 
   explicit BoardModel(std::uint64_t seed, const Wiring& wiring = plan_wiring());
 
@@ -113,7 +113,7 @@ class BoardModel {
   const UltrasonicModel& ultrasonic(int channel) const { return sensors_[channel - 1]; }
 
  private:
-  static constexpr std::uint32_t settling_ms = 5;  // of a chip's outputs, after a transfer
+  static constexpr std::uint32_t settling_ms = 5;  // for a chip's outputs, after a transfer
   static constexpr std::int32_t steering_range = 3 * 1000 * 2048;  // 1.5 s of 4096 a millisecond
 
   struct Shaft {
@@ -157,12 +157,12 @@ class BoardModel {
   RobotModel* robot_ = nullptr;
   RobotModel::Senses senses_;
   std::uint32_t time_ms_ = 0;
-  std::uint32_t now_us_ = 0;  // of the microcontroller's clock
+  std::uint32_t now_us_ = 0;  // time of the microcontroller's clock
   BoardChips chips_;
   UserDevices devices_;
   Stepper steppers_[stepper_channels];
   Shaft shafts_[encoder_channels];
-  std::int32_t steering_ = 0;  // from the end of forward
+  std::int32_t steering_ = 0;  // position from the end of forward
   UltrasonicModel sensors_[ultrasonic_channels];
   bool handle_held_ = true;
   // The levels of the signals that end at a pin of the Giga; levels of outputs are not used.
@@ -175,7 +175,7 @@ class BoardModel {
   Converter converters_[analog_channels];
   OpenAnalogPin open_analog_;
   std::int32_t pinned_cv_[analog_channels] = {};
-  std::uint32_t bus_transfers_ = 0;  // at the last pins_may_differ()
+  std::uint32_t bus_transfers_ = 0;  // transfers at the last pins_may_differ()
   std::uint32_t disturbed_ms_ = 0;   // last time that pins may have changed
   std::int32_t divider_[analog_channels] = {100, 100, 100, 100, 100, 100};
   std::uint32_t defects_ = 0;

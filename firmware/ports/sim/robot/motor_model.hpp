@@ -22,7 +22,7 @@ class MotorModel {
     const std::int32_t duty = drive.direction == Direction::forward ? drive.pwm : -drive.pwm;
     duty_ = duty;
     const std::int32_t wanted_q12 = duty * (top_speed * 4096 / pwm_max);
-    // The last part is taken whole, so that a motor without current stops.
+    // The last step is the whole difference, so that a motor without current stops.
     const std::int32_t missing_q12 = wanted_q12 - speed_q12_;
     const std::int32_t step = missing_q12 / 256;
     speed_q12_ += step != 0 ? step : missing_q12;
@@ -47,7 +47,7 @@ class MotorModel {
 
   std::int32_t duty_ = 0;       // -4095 to 4095
   std::int32_t speed_q12_ = 0;  // counts a second, times 4096
-  std::int32_t part_ = 0;       // of a count, in 1/counts_q12
+  std::int32_t part_ = 0;       // fraction of a count, in 1/counts_q12
 };
 
 }  // namespace sim

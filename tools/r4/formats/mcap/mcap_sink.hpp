@@ -40,7 +40,7 @@ class McapSink final : public Sink {
   struct Channel {
     std::uint16_t id = 0;
     std::uint64_t messages = 0;
-    std::string record;  // repeated in each chunk, to make it readable alone
+    std::string record;  // repeated in each chunk, to make the chunk readable alone
     std::string index;
   };
   struct ChannelKey {
@@ -69,11 +69,11 @@ class McapSink final : public Sink {
   bool begun_ = false;
   std::map<ChannelKey, Channel> channels_;
   std::map<std::uint16_t, Channel*> current_;
-  std::map<std::uint16_t, std::string> urls_;  // by path, of this recording
+  std::map<std::uint16_t, std::string> urls_;  // URLs of this recording, by path
   Channel* lines_ = nullptr;
 
   std::uint64_t offset_ = 0;
-  std::uint32_t crc_ = 0;  // of the file so far
+  std::uint32_t crc_ = 0;  // checksum of the file so far
   std::string chunk_;
   std::string record_, text_, compressed_;
   std::uint64_t chunk_first_ns_ = 0, chunk_last_ns_ = 0;

@@ -26,7 +26,7 @@ class McapSource final : public Source {
  private:
   struct Channel {
     std::optional<std::uint16_t> path;  // none: a channel of another program
-    std::string url, name;              // of the path; empty: unknown
+    std::string url, name;              // URL and name of the path; empty: unknown
     bool told = false;                  // the path has been reported
   };
   enum class Part : std::uint8_t { magic, header, data, summary, end };
@@ -49,7 +49,7 @@ class McapSource final : public Source {
   std::uint32_t crc_ = 0;     // of all bytes before waiting_
   bool any_damage_ = false;
   bool ours_ = false;
-  bool searching_ = false;  // for the next chunk after damage
+  bool searching_ = false;  // looking for the next chunk after damage
   std::map<std::uint16_t, Channel> channels_;
   std::string chunk_, bytes_;
   RecordingLines lines_;

@@ -47,7 +47,7 @@ std::string address_text(int family, std::string_view bytes) {
 
 bool is_vlan_tag(std::uint16_t type) { return type == 0x8100 || type == 0x88A8 || type == 0x9100; }
 
-// True for a possible id: 11 bits unless extended; in an error frame, only the ten error classes.
+// True for a possible id: 11 bits; extended: 29 bits; error frame: only the ten error classes.
 bool can_be_id(std::uint32_t id) {
   constexpr std::uint32_t flags = can_extended | can_remote | can_error;
   if ((id & can_error) != 0) return (id & ~flags) < 0x400;

@@ -20,7 +20,7 @@
 namespace r4::tool {
 
 struct PacketInterface {
-  std::uint32_t number = 0;  // in the file, across sections
+  std::uint32_t number = 0;  // number in the file, across sections
   std::uint16_t link_type = 0;
   std::string name;         // "can0"; empty: unknown
   std::string description;  // identifies r4's own interfaces
@@ -45,7 +45,7 @@ class PacketRecords {
   // Throws Error{data} for mixed recordings.
   void on_packet(const PacketInterface& interface, const Packet& packet);
   void on_damage() { lines_.on_damage(); }
-  // Throws Error{data} if no data of a board was found, unless damage may be the reason.
+  // Throws Error{data} if no data of a board was found, and damage cannot be the reason.
   void finish(bool any_damage);
 
  private:

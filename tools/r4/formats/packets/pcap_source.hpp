@@ -57,7 +57,7 @@ class PcapSource final : public Source {
   ByteOrder order_ = ByteOrder::little;
   std::string waiting_;
   std::uint64_t offset_ = 0;  // position of waiting_ in the file
-  bool searching_ = false;    // for the next block after damage
+  bool searching_ = false;    // looking for the next block after damage
   std::vector<Interface> interfaces_;
   std::uint32_t interface_count_ = 0;
   bool any_damage_ = false;

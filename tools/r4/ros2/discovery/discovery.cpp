@@ -56,7 +56,7 @@ Discovery::Discovery(const std::vector<dds_entity_t>& own, Tell tell)
 }
 
 void Discovery::look() {
-  look_at_participants();  // before its readers and writers
+  look_at_participants();  // participants before readers and writers
   look_at(EndpointKind::writer, writers_.get());
   look_at(EndpointKind::reader, readers_.get());
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Our part of the ROS 2 graph: nodes with their topics and services.
-// Cyclone DDS numbers a participant's entities with 14 bits, so 64 nodes share a participant.
-// Create nodes before list_nodes(); readers also later, on the reading thread. leave() removes all
-// nodes at once, and the destructor waits until that is sent. A killed process is listed for 10 s.
+// Our part of the ROS 2 graph: nodes with their topics and services. Cyclone DDS numbers a
+// participant's entities with 14 bits, so 64 nodes share a participant. Create nodes before
+// list_nodes(). Readers may follow, on the reading thread. leave() removes all nodes at once, and
+// the destructor waits until the removal is sent. A killed process is listed for 10 s.
 #pragma once
 
 #include <chrono>
@@ -74,7 +74,7 @@ class Graph {
   dds_entity_t participant() const { return members_.front().participant.get(); }
   std::vector<dds_entity_t> participants() const;
   void list_nodes(const std::string& distro);
-  // On the reading thread.
+  // Call on the reading thread.
   void on_announced(const Announced& announced);
   void leave();
 

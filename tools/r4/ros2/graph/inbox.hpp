@@ -30,7 +30,7 @@ namespace r4::tool::ros2 {
 
 struct Origin {
   std::uint64_t publisher = 0;  // unique
-  EntityId writer{};            // the same after a reconnect; 0: unknown because it has left
+  EntityId writer{};            // the same after a reconnect; 0: unknown, because the writer left
   std::chrono::steady_clock::time_point written;  // by our clock, as far as known (Transit)
 };
 

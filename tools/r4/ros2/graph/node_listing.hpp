@@ -2,7 +2,7 @@
 // Supports `ros2 node list`: each participant publishes its nodes with their readers and writers on
 // ros_discovery_info. An id has 24 bytes up to Humble and 16 since Iron, under one type name, and
 // the wrong size makes a receiver throw. So nothing is published until the type hash of another
-// participant's writer shows its release. ROS does not support two releases: the first counts.
+// participant's writer shows its release. ROS cannot mix releases, so the first release is used.
 #pragma once
 
 #include <cstddef>

@@ -16,7 +16,7 @@ namespace r4::tool::ros2 {
 class Outbox {
  public:
   using Job = std::function<void()>;
-  // Returns false to be repeated, unless `last` is true.
+  // If `last` is false and an attempt returns false, the attempt is repeated.
   using Attempt = std::function<bool(bool last)>;
 
   // `room`: most waiting jobs; the oldest is dropped.
@@ -27,7 +27,7 @@ class Outbox {
 
   // Never blocks.
   void push(Job job);
-  // Repeated every few milliseconds for up to 100 ms; other jobs continue meanwhile.
+  // Repeats the attempt every few milliseconds, for up to 100 ms. Other jobs continue meanwhile.
   void push_attempt(Attempt attempt);
   // Ends after the current job and drops waiting jobs. Idempotent.
   void stop();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Estimates the transit time of samples. In a graph of one computer the common clock measures it.
-// The clocks of two computers differ, so the delay is relative to the publisher's fastest sample.
-// The first sample has no reference. Clocks may drift by 0.02 %, but by at most 0.5 s between two
+// Estimates the transit time of samples. On one computer the common clock measures this time. The
+// clocks of two computers differ, so the delay is relative to the publisher's fastest sample. The
+// first sample has no reference. Clocks may drift by 0.02 %, but by at most 0.5 s between two
 // samples, because a delayed sample after a long silence must not seem fresh. After a clock was
 // set, all samples seem slow. The new offset is accepted after ten slow samples a second apart.
 #pragma once
@@ -51,7 +51,7 @@ class Transit {
     Duration since;
     Duration counted;  // newest counted sample
     Duration least;
-    int samples;  // a second apart, because delayed samples arrive together
+    int samples;  // slow samples a second apart, because delayed samples arrive together
   };
   static constexpr int drift = 5000;
   static constexpr std::chrono::milliseconds most_drifted{500};

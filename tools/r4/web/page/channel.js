@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The control of one output. A slider streams: while a command waits for its confirmation, only the
-// newest value is queued. The slider follows the board's report unless the user is setting it, so
+// newest value is queued. While the user does not set the slider, it follows the board's report, so
 // no old setpoint remains after a stop.
 import {kind_of} from './channel_kinds.js';
 import {element, put} from './text.js';

@@ -6,7 +6,7 @@ import {board_name, clock_text, element, put, value_text} from './text.js';
 const GAP_MS = 500;  // states further apart are not joined
 const COLOURS = 8;   // --line0 … of the style; further lines are dashed
 const MOST_ZOOM_MS = 50;
-const KEY_STEP = 0.005;  // of a chart's width
+const KEY_STEP = 0.005;  // fraction of a chart's width
 const LEAST_DRAG = 0.005;
 const {Dygraph} = globalThis;
 // The legend sets a style attribute, which the page's policy forbids.

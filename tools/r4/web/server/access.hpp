@@ -45,7 +45,7 @@ class Access {
 
   // For every request. An empty origin is allowed: browsers always send a foreign page's origin.
   Verdict check(std::string_view host, std::string_view origin) const;
-  // As check(), for read-only clients of the Foxglove protocol.
+  // Like check(), for read-only clients of the Foxglove protocol.
   Verdict check_reader(std::string_view host, std::string_view origin) const;
   // For requests about the robot. The token is in `authorization`, `target`'s query or `protocols`.
   Verdict check_token(std::string_view authorization, std::string_view target,

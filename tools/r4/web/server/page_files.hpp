@@ -26,7 +26,7 @@ struct PageFile {
 using PageFiles = std::map<std::string, PageFile, std::less<>>;
 PageFiles page_files();
 PageFile page_file(std::string_view name, std::string_view content);
-// Empty unless it is a regular file directly in the folder, not hidden and not too large.
+// Empty if not a regular file directly in the folder, or if hidden or too large.
 std::optional<PageFile> page_file_in(const std::string& folder, std::string_view path);
 
 }  // namespace r4::tool::web

@@ -65,7 +65,7 @@ class Server {
   void start();
   const ListenAddress& address() const;
 
-  // From any thread; executed on the server's thread. Unknown clients are ignored.
+  // Call from any thread. Executed on the server's thread. Unknown clients are ignored.
   void send(ClientId client, Outgoing message);
   void broadcast(Protocol protocol, Outgoing message);
   void read_on(ClientId client);

@@ -13,7 +13,7 @@
 
 namespace r4::tool::web {
 
-// A client is dropped if a write takes longer.
+// If a write takes longer, the client is dropped.
 constexpr auto stall_time = 10s;
 constexpr auto idle_time = 20s;
 
