@@ -2,7 +2,7 @@
 // main() of the test programs. Some tests measure promises about real time. A standstill of the
 // machine (such as a paused virtual machine) breaks every bound. A thread that only reads the clock
 // detects a standstill. A failure during a standstill proves nothing, so the test is repeated. Any
-// other failure counts. integration/repeat.py has the same rule.
+// other failure is final. integration/repeat.py has the same rule.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -35,7 +35,7 @@ void* or_throw(void* memory) {
 }  // namespace
 
 // The array forms of the standard library call these operators. A sanitizer's nothrow forms do not
-// call them, so the nothrow forms are also replaced.
+// call these operators, so this file also replaces the nothrow forms.
 void* operator new(std::size_t size) { return or_throw(allocate(size)); }
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) {

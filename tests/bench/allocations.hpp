@@ -9,7 +9,6 @@ namespace r4::bench {
 
 // Calls of operator new in this process so far, by all threads.
 std::uint64_t allocations();
-// Calls of operator new by the calling thread.
 std::uint64_t allocations_of_this_thread();
 
 // The average number of calls of operator new during one call of `work`.

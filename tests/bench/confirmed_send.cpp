@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The reference of python_bench.py. `r4_confirmed_send URL COUNT` sends each command after the
-// confirmation of the command before it. It prints the median time of a command in microseconds.
+// confirmation of the previous command, and prints the median time of a command in microseconds.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>

@@ -113,7 +113,7 @@ TEST(BoardHardware, MayBeMadeSafeWhileItIsBeingMadeSafe) {
   }
 }
 
-// A host may repeat its stop: the second interrupt comes in the middle of the first make_safe().
+// A host may repeat its stop: the second interrupt occurs in the middle of the first make_safe().
 TEST(BoardHardware, MayBeMadeSafeAgainWhileAnInterruptMakesItSafe) {
   for (int at = 0; at < 7; ++at) {
     for (int again = 0; again < 14; ++again) {

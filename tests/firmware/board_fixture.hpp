@@ -187,8 +187,8 @@ class TestBoard {
     return heard;
   }
 
-  // The T that a host on that port echoes: the T of the newest heartbeat. 0 before the first
-  // heartbeat, and if the newest heartbeat reports CONNECTING.
+  // The T that a host on that port echoes: the T of the newest heartbeat. Before the first
+  // heartbeat, or if the newest heartbeat reports CONNECTING: 0.
   std::uint32_t newest_t(int port = 0) {
     for (const MemoryPort::Sent& sent : ports[port].sent) {
       Datagram datagram;
@@ -202,7 +202,7 @@ class TestBoard {
     return newest_t_[port];
   }
 
-  // The cause that the newest heartbeat reports; 0: none.
+  // The cause that the newest heartbeat reports. 0: no cause.
   std::int32_t newest_cause() {
     for (int i = 0; i < firmware::Application::max_ports; ++i) newest_t(i);
     return newest_cause_;

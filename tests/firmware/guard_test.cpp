@@ -48,8 +48,8 @@ TEST_F(GuardTest, FeedsTheWatchdogOnlyWhenEveryDutyHasCheckedIn) {
 
 TEST_F(GuardTest, FeedsTheWatchdogIfThereAreNoDuties) { EXPECT_EQ(run(3), 3); }
 
-// Outputs must not be live without a guard. A developer who adds too many duties notices it at
-// once.
+// Outputs must not be live without a guard. A developer who adds too many duties notices the fault
+// at once.
 TEST_F(GuardTest, TooManyDutiesKeepOutputsSafeAndTheWatchdogUnfed) {
   for (int i = 0; i < Guard::max_duties; ++i) EXPECT_EQ(guard.add_duty(20), i);
   EXPECT_EQ(run(1, {0, 1, 2, 3, 4, 5, 6, 7}), 1);
@@ -215,7 +215,7 @@ TEST_F(GuardedBoard, ARepeatedStopHeardByAnInterruptIsNotANewCause) {
   EXPECT_FALSE(application.safe_report().has_stop);
 }
 
-// An interrupt detects stops whose datagrams are then lost, because a port has no room for them.
+// An interrupt detects stops. The stop datagrams are then lost, because a port has no room.
 class StopWithoutDatagram : public GuardedBoard {
  protected:
   void hear() {

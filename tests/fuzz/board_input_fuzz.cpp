@@ -6,7 +6,7 @@
 // peer, and bit 2 is the port. Bit 3 adds a checksum after the payload. Bits 4-6 are the time that
 // passes before the line. A payload that begins with '!' is an event on the board.
 //
-// Other payloads have placeholders for the values that only a host with a session knows:
+// Other payloads have placeholders for the values that only a host with a session has:
 //   $T  the T of the newest heartbeat that the peer received
 //   $S  the field of the peer's session, "SID:...;"
 //   $N  the peer's next packet number; $L its last number; $P its next number as a paper host
@@ -120,7 +120,7 @@ class UserBus final : public firmware::UserI2cPort {
   unsigned sum_ = 0;
 };
 
-// A board with its hardware, and the values that its hosts know.
+// A board with its hardware, and the values that its hosts have.
 class World final : public firmware::Hal, public firmware::Observer {
  public:
   explicit World(bool keyed) : keyed_(keyed) {
@@ -231,8 +231,8 @@ class World final : public firmware::Hal, public firmware::Observer {
     ++sent_;
   }
 
-  // States may be sent to each path of the controlling host, and to everyone on the ports without
-  // such a path. During a lease they may also be sent to a watcher that has echoed its LEASE.
+  // States may be sent to each path of the controlling host, and to everyone on ports without its
+  // paths. During a lease, states may also be sent to a watcher that has echoed its LEASE.
   bool may_get_states(int port, std::uint32_t peer) const {
     const BoardLink& link = board_->link();
     const Host& host = hosts_[port][peer];

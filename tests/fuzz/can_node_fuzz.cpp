@@ -146,7 +146,7 @@ class End {
   std::vector<std::uint32_t> counters_;
 };
 
-// Receives all frames and sends none.
+// Receives all frames and sends no frame.
 class Listener {
  public:
   Listener() {

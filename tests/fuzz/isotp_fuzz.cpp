@@ -27,8 +27,8 @@ class Fuzz {
   explicit Fuzz(Input& input)
       : input_(input),
         capacity_(input.word() % 6000),
-        // On the heap and of exactly this size, so that a sanitizer finds an access beyond the
-        // buffer.
+        // The buffer is on the heap and has exactly this size, so that a sanitizer finds an access
+        // beyond the buffer.
         buffer_(capacity_),
         datagram_(input.word() % 6000),
         sender_(sender_options()),
@@ -111,7 +111,7 @@ class Fuzz {
     }
   }
 
-  // All bytes of a datagram are its number. Its size is at most 15 bytes less than the buffer's.
+  // All bytes of a datagram are its number. At most 15 bytes of the buffer are unused.
   void begin(std::uint8_t action) {
     if (sender_.busy() || datagram_.empty()) return;
     const std::size_t less = action >> 4;

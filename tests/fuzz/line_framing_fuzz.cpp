@@ -50,7 +50,7 @@ Split framed(const std::string& stream, std::uint32_t cuts) {
   LineFraming framing;
   for (std::size_t at = 0; at < stream.size();) {
     cuts = cuts * 1664525U + 1013904223U;
-    // Most pieces are small. One in 16 may be longer than a line.
+    // Most pieces are small. One piece in 16 may be longer than a line.
     const std::size_t limit = (cuts >> 28) == 0 ? 3000 : (cuts >> 28) * 8;
     const std::string part = stream.substr(at, (cuts >> 8) % limit);
     at += part.size();

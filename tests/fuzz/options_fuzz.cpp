@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any text for a link: it is refused with a reason, or it is a valid URL, or it is a bad link
-// within its bounds. A bad link loses and delays datagrams as its text says, and adds none.
+// Any text for a link: it is refused with a reason, is a valid URL, or is a bad link within its
+// bounds. A bad link loses and delays datagrams as its text states, and adds no datagram.
 #include <chrono>
 #include <cstdint>
 #include <string>

@@ -24,7 +24,7 @@ void comes_back(Text datagram) {
   const std::size_t size = pack(datagram, bytes, sizeof bytes);
   if (size == 0) return;
   require(size < datagram.size() && is_packed(bytes[0]));
-  // On the heap and of exactly this size, so that a sanitizer finds an access beyond the buffer.
+  // `exact` has exactly this size on the heap, so a sanitizer finds an access beyond the buffer.
   const std::string exact(reinterpret_cast<const char*>(bytes), size);
   std::string out(datagram.size(), '\0');
   const UnpackResult result =

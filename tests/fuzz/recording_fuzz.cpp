@@ -107,7 +107,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const r4::File file(bytes);
   const std::vector<std::string> played = r4::played(file.path(), {});
   // A record of another version ends the reading and the replay. The replay may end without playing
-  // the records before it.
+  // the earlier records.
   r4::require(played.empty() || played == whole.said);
   const std::vector<std::string> later =
       r4::played(file.path(), {.time = r4::Time(data[0] * 100'000)});

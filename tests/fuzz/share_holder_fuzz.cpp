@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Any number of programs connect to the holder of a shared transport, send any messages, read or do
-// not read, and disconnect. Only their stops reach the board. A watcher receives everything, and
-// the stop of the last program is obeyed. The input is a list of actions.
+// not read, and disconnect. Only the stops of these programs reach the board. A watcher receives
+// everything, and the stop of the last program is obeyed. The input is a list of actions.
 #include <fmt/format.h>
 #include <sys/socket.h>
 #include <unistd.h>

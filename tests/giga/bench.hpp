@@ -106,8 +106,8 @@ class GigaBench {
       next += 100;
     }
   }
-  // Runs the board until `done`, and gives the firmware's threads time. True if `done` came in
-  // time.
+  // Runs the board until `done`, and gives the firmware's threads time. True if `done` became true
+  // in time.
   bool run_until(const std::function<bool()>& done) {
     for (int i = 0; i < 20000; ++i) {
       if (done()) return true;

@@ -49,7 +49,7 @@ class GigaDevices : public testing::Test {
   GigaBench bench;
   PlainHost host;
   State state;
-  const char* told = "I2CBUS";  // only states with this field count
+  const char* told = "I2CBUS";  // only states with this field are counted
 };
 
 TEST(UserI2cTiming, KeepsTheLimitsOfStandardModeForEveryClock) {

@@ -244,7 +244,7 @@ int Giga::rises(char port, int number) const {
   return rises_[static_cast<std::size_t>(port - 'A')][static_cast<std::size_t>(number)];
 }
 
-// Runs the interrupts that are due, unless interrupts are off or an interrupt is running.
+// If interrupts are on and no interrupt is running, runs the interrupts that are due.
 void Giga::interrupts_may_come() {
   constexpr std::uint64_t bite_ns = 500000000;
   if (watchdog_runs && now_ns_ - watchdog_fed_ns > bite_ns) {

@@ -34,7 +34,7 @@ class I2cPeripheral {
  public:
   // Another device holds SDA until SCL has risen `clocks` times.
   void hold_sda(int clocks) { sda_held_ = clocks; }
-  // Another device holds SCL until this is called with false.
+  // Another device holds SCL until the call of hold_scl(false).
   void hold_scl(bool held) { scl_held_ = held; }
   // SDA is held for `clocks` after `bytes` more bytes were sent.
   void hold_after(int bytes, int clocks) {
@@ -147,7 +147,7 @@ class CanPeripheral {
   void go_bus_off();
   std::deque<CanFrame> sent;
   int overtaken = 0;  // urgent frames that have overtaken waiting frames
-  // Called after a frame is sent.
+  // Is called after a frame is sent.
   std::function<void(const CanFrame&)> on_sent;
 
  private:

@@ -285,7 +285,7 @@ TEST(I2cController, DoesNotRepeatATransferAfterAnInterruptUsedTheBus) {
   }
 }
 
-// The interrupt may also come while SDA is freed for the second attempt.
+// The interrupt may also occur while SDA is freed for the second attempt.
 TEST(I2cController, AReadThatWasTakenOverIsNotRepeated) {
   int taken_over = 0;
   for (std::uint64_t at_us = 1;; ++at_us) {

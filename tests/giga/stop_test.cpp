@@ -105,8 +105,8 @@ TEST(GigaStop, AStopOverUsbOrByCanFrameWorksAtAnyMomentOfATurn) {
   }
 }
 
-// The loop assembles a datagram from CAN frames, so its stop waits for the end of a turn. Our hosts
-// send a stop as a frame instead.
+// The loop assembles a datagram from CAN frames, so a stop in a datagram waits for the end of a
+// turn. Our hosts send a stop as a frame instead.
 TEST(GigaStop, AStopByCanDatagramWorksInTheNextTurn) {
   StopBench bench;
   std::uint64_t longest_us = 0;

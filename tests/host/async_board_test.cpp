@@ -332,7 +332,7 @@ TEST_P(DestroyedIn, MayDestroyTheBoard) {
   }
 }
 
-// The transport comes up at once, and reports it inside open().
+// The transport is up at once, and reports the change inside open().
 TEST(AsyncBoardEnd, MayBeClosedOrDestroyedInAnEventOfOpen) {
   asio::io_context io;
   AsyncBoard closed(io, "sim:");

@@ -30,7 +30,7 @@ constexpr Direction forward = Direction::forward;
 // change at the end of a transfer.
 class Wheels final : public sim::I2cObserver {
  public:
-  // `osmc`: the number of OSMC channels among the four wheels; the other wheels are DHB12 channels.
+  // `osmc`: the number of OSMC channels among the four wheels. The other wheels are DHB12 channels.
   Wheels(sim::BoardChips& chips, Drive wanted, int osmc)
       : chips_(chips), wanted_(wanted), osmc_(osmc) {
     chips_.bus.set_observer(this);

@@ -42,7 +42,7 @@ TEST_F(BoardI2c, PutsRepeatedReadingsIntoTheState) {
   for (int i = 0; i < 100 && state.raw.i2c[0].data.size == 0; ++i) state = board.next_state();
   ASSERT_EQ(state.raw.i2c[0].data.size, 1);
   EXPECT_EQ(state.raw.i2c[0].data.bytes[0], 0x68);
-  // If its loop is late, a board samples after the T of its state.
+  // If the loop of a board is late, the board samples after the T of its state.
   EXPECT_LE(static_cast<std::int32_t>(state.t_ms - state.raw.i2c[0].t_ms), 40);
   board.i2c().poll_off(1);
   for (int i = 0; i < 100 && state.raw.i2c[0].data.size != 0; ++i) state = board.next_state();

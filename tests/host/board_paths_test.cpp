@@ -140,7 +140,7 @@ TEST(BoardPaths, ContinueIfALaterDeviceOfAPathIsInvalid) {
   EXPECT_EQ(board.link().carrying, 1);
 }
 
-// One end of a memory carrier. The test can cut it, with or without an event.
+// One end of a memory carrier, which the test can cut with or without an event.
 class Cuttable final : public WrappedCarrier {
  public:
   using WrappedCarrier::WrappedCarrier;

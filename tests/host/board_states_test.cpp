@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The order of states: which states wait, which states are replaced, and gaps if the user wants
-// every state.
+// The order of states: which states wait, and which states are replaced. If the user wants every
+// state, gaps are reported.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -454,7 +454,7 @@ TEST(Board, CloseEndsAllWaitingCalls) {
 TEST(Board, MayBeDestroyedInACallback) {
   auto board = std::make_unique<Board>("sim:", at_will());
   const First<bool> destroyed;
-  // Destroyed in the thread of the board's callbacks, which must also end.
+  // This object is destroyed in the thread of the board's callbacks, which must also end.
   struct AtThreadExit {
     First<bool> ended;
     ~AtThreadExit() { ended.set(true); }

@@ -326,7 +326,7 @@ TEST_F(HangingCallbacks, StopTheHeartbeatsUntilTheyReturn) {
 
 TEST(BoardCallbacks, ALateCallbackGetsTheNewestState) {
   Board board("sim:");
-  board.send("F:DEFAULT");  // no other event comes after this command
+  board.send("F:DEFAULT");  // no other event follows this command
   std::promise<void> late;
   const First<std::uint32_t> next;
   board.on_state([&, next, calls = 0](const State& state) mutable {
@@ -336,8 +336,8 @@ TEST(BoardCallbacks, ALateCallbackGetsTheNewestState) {
   });
   std::uint32_t newest = 0;
   for (int i = 0; i < 5; ++i) newest = board.next_state().t_ms;
-  // Waiting calls get a state before callbacks do. So after the next state, this state has been
-  // reported.
+  // Waiting calls get each state before the callbacks get the same state. When next_state()
+  // returns, the callbacks have got the previous state.
   board.next_state();
   late.set_value();
   EXPECT_GE(next.get(), newest);

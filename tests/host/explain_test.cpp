@@ -11,7 +11,7 @@
 namespace r4 {
 namespace {
 
-// In the order of the enumeration. to_text() has no text after the last cause.
+// All causes in the order of the enumeration. to_text() has no text after the last cause.
 std::vector<LinkCause> all_causes() {
   std::vector<LinkCause> all;
   for (unsigned i = 0; *to_text(static_cast<LinkCause>(i)) != '\0'; ++i) {

@@ -160,8 +160,8 @@ TEST(BadLink, LosesDuplicatesAndDamagesDatagramsOfAnyBoard) {
   EXPECT_GT(statistics.packets.lost, 3U);
   EXPECT_GT(statistics.packets.duplicate, 3U);
   EXPECT_GT(statistics.damaged, 1U);
-  // The library repeats the command until it is confirmed. If all duplicates came too late, the
-  // test sends the command again, as the error says.
+  // The library repeats the command until it is confirmed. If all duplicates arrived too late, the
+  // test sends the command again, as the error advises.
   for (Refusal refusal = Refusal::stale; refusal == Refusal::stale;) {
     try {
       board.osmc(1).set_pwm(358, Direction::forward, std::chrono::seconds{10});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Callbacks and their handles. board_thread_test.cpp tests them with the threads of a board.
+// Callbacks and their handles. board_thread_test.cpp tests callbacks with the threads of a board.
 #include "host/subscribers.hpp"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 namespace r4::test {
 namespace {
 
-// An object that a callback captures. Its destructor cancels the callback.
+// An object that a callback captures, and whose destructor cancels the callback.
 struct Captured {
   Subscription subscription;
   int* gone = nullptr;

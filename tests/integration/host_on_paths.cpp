@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host program with several paths to its board, for host_on_paths.py. It sends one command after
-// another. It reports every state, the end of every command and every change of its paths.
+// A host program with several paths to its board, for host_on_paths.py. The program sends one
+// command after another, and reports all states, ends of commands and changes of paths.
 //
 //     host_on_paths URL...                     ends when its input ends
 //

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Another participant in a ROS 2 graph, with Fast DDS. It reads and writes bytes, whose form only
-// the test defines. integration/test_ros2.py sends it lines on stdin and reads JSON, one object per
-// line, from stdout:
+// Another participant in a ROS 2 graph, with Fast DDS. The peer reads and writes bytes, whose form
+// only the test defines. integration/test_ros2.py sends the peer lines on stdin and reads JSON, one
+// object per line, from stdout:
 //
 //     reader TOPIC TYPE RELIABILITY DURABILITY USERDATA    {"type":"sample","topic":…,"bytes":"0001…"}
 //     writer TOPIC TYPE RELIABILITY DURABILITY USERDATA    {"type":"matched","topic":…,"readers":1}
@@ -13,8 +13,8 @@
 // RELIABILITY is reliable or best_effort, DURABILITY is volatile or transient_local, USERDATA is a
 // text or -. The peer also reports the endpoints of other participants,
 // {"type":"endpoint","kind":"writer","topic":…,"of":…,"user_data":…,"gid":…}, with "gone":true when
-// they end. It reports the participants, {"type":"participant","user_data":…,"gone":…}. Its domain
-// is ROS_DOMAIN_ID, only on 127.0.0.1.
+// they end. The peer reports the participants, {"type":"participant","user_data":…,"gone":…}. The
+// domain is ROS_DOMAIN_ID, only on 127.0.0.1.
 #if __has_include(<fastdds/utils/IPLocator.hpp>)
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
 #include <fastdds/utils/IPLocator.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor, for tests. Its drivers use chips on a bus in real time, and
-// interrupts occur in the middle of its transfers. A host sends commands as lines of text, and a
+// The whole board on the processor, for tests. The board's drivers use chips on a bus in real time,
+// and interrupts occur in the middle of transfers. A host sends commands as lines of text, and a
 // listener receives the board's UDP datagrams.
 //
 // Timer 1 interrupts every 50 us. Each interrupt delivers five bytes of a line at 1 Mbit/s, and
@@ -96,7 +96,7 @@ class Bench final : public sim::I2cObserver {
     safe_ = safe;
   }
 
-  // Called every step_us.
+  // Is called every step_us.
   void step() {
     for (std::uint32_t i = 0; i < bytes_a_step && line_sent_ < line_size_; ++i) {
       link_.on_byte(line_[line_sent_]);
@@ -108,7 +108,7 @@ class Bench final : public sim::I2cObserver {
     if ((++steps_ % (1000 / step_us) == 0 || stop) && board_.on_wake()) feedings_ = feedings_ + 1;
   }
 
-  // Starts to deliver a line; step() delivers its bytes.
+  // Starts to deliver a line. step() delivers the bytes of the line.
   void send(DatagramWriter& writer) {
     const Text datagram = writer.finish(pnum_, 100000 + pnum_);
     ++pnum_;

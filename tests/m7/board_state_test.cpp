@@ -8,7 +8,7 @@ namespace {
 using namespace r4;
 using namespace r4::m7;
 
-// Whole turns and a part of a turn, different for each encoder; encoders 2 and 4 turn backwards.
+// Whole turns and a part of a turn, different for each encoder. Encoders 2 and 4 turn backwards.
 std::int32_t turns_of(int channel) {
   return (channel % 2 == 0 ? -channel : channel) * sim::BoardModel::counts_a_turn;
 }
@@ -109,8 +109,8 @@ TEST(BoardState, AnObstacleAtAnySensorSwitchesEverythingOff) {
   }
 }
 
-// Measured by the board's clock and counters. An instruction takes 8 ns here, however busy the
-// machine is.
+// The board's clock and counters measure the states. An instruction takes 8 ns here, however busy
+// the machine is.
 TEST(BoardState, StreamsAt1000HzOverUdpWithNothingLostOrLeftOut) {
   Heard board;
   board.host.execute(Command::fields("DEFAULT,LATE"));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Checksums, signatures, numbers, lines and the packed form on the board. The compiler, the C
-// library or the byte order could make them differ from the results on the build machine.
+// library or the byte order could make the results differ from the results on the build machine.
 #include "on_target.hpp"
 #include "protocol/datagram/crc32.hpp"
 #include "protocol/datagram/numbers.hpp"

@@ -30,7 +30,7 @@ __attribute__((noinline)) void loop(std::uint32_t turns) {
 }
 
 // Repetitions between two readings of the timer. Reading the timer also takes instructions. The
-// repetitions make their share small.
+// repetitions make the share of the reading small.
 constexpr std::uint32_t repetitions = 100;
 
 template <class Work>
@@ -65,7 +65,7 @@ class Sink final : public firmware::Port {
   volatile std::size_t size_ = 0;
 };
 
-// Costs almost no instructions, because the cost of the chips does not belong to the protocol.
+// This Hal costs almost no instructions, because the chips' cost is not part of the protocol.
 class Hal final : public firmware::Hal {
  public:
   void apply(const firmware::Outputs& outputs) override { pwm_ = outputs.osmc[0].pwm; }
@@ -123,7 +123,7 @@ Text written(const State& state, char* buffer) {
   return writer.finish(22, 79146);
 }
 
-// Signs the datagram if there is a signer.
+// If there is a signer, signs the datagram.
 void sign(Signer* signer, DatagramWriter& writer) {
   if (signer != nullptr) signer->sign(writer, 1700000000000000, 1000);
 }
@@ -131,7 +131,7 @@ void sign(Signer* signer, DatagramWriter& writer) {
 constexpr SessionId session = 0x0123456789abcdef;
 
 // Instructions to read, check and execute one datagram with `group` commands. Each datagram has a
-// new packet number, and is signed if there is a key.
+// new packet number. If there is a key, each datagram is signed.
 std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, SessionId sid,
                                    const Key* key = nullptr, std::uint32_t group = 1) {
   Sink sink;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Runs the tests, then provokes each kind of fault. After each reset it checks the note of the
-// fault. The exit status is the number of failures.
+// Runs the tests, then provokes each kind of fault. After each reset the program checks the note of
+// the fault. The exit status is the number of failures.
 #include <cstdint>
 
 #include "board_bench.hpp"
@@ -14,7 +14,7 @@ namespace {
 using namespace r4;
 using namespace r4::m7;
 
-// Keeps its values over resets.
+// A note that keeps its values over resets.
 struct Story {
   std::uint32_t failures;
   std::uint32_t made_safe;

@@ -45,7 +45,7 @@ struct End {
   }
 };
 
-// A datagram "H:R4" from 10.0.2.2:5000 to the board's port, as QEMU's network sends it. Its UDP
+// A datagram "H:R4" from 10.0.2.2:5000 to the board's port, as QEMU's network sends it. The UDP
 // checksum is 0 (none).
 std::size_t question(std::uint8_t* frame) {
   static const std::uint8_t bytes[] = {

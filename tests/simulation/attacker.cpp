@@ -65,7 +65,7 @@ void Attacker::on_board(std::string_view bytes) {
   echo_ = is_connecting_heartbeat(datagram) ? "0" : fmt::format("{}", board_t_);
 }
 
-// Has the next packet number of the host of `like`.
+// `field` with the next packet number of the host of `like`.
 std::string Attacker::own(const std::string& field, const Heard& like, Random& random) const {
   Datagram datagram;
   read_datagram(Text(like.bytes), datagram);

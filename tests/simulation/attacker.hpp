@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An attacker on the network of a board with a key. It does not have the key. It receives all
-// datagrams in both directions. It can send the board datagrams from any address, undamaged and in
-// time.
+// An attacker on the network of a board with a key. The attacker does not have the key, but
+// receives all datagrams in both directions. The attacker can send the board datagrams from any
+// address, undamaged and in time.
 #pragma once
 
 #include <cstdint>
@@ -34,8 +34,8 @@ struct Attack {
   };
   Kind kind = Kind::replay;
   std::string bytes;  // empty: the attacker has nothing to send
-  int host = -1;      // the host whose address it uses; -1: its own address
-  Origin like;        // the origin of the datagram that it repeats or changes
+  int host = -1;      // the host whose address the attacker uses; -1: an address of its own
+  Origin like;        // the origin of the datagram that the attacker repeats or changes
 };
 const char* to_text(Attack::Kind kind);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A working day of one board in virtual time, with the application and the chip drivers on the
 // model of the board. A host drives the board, and an incident occurs every few minutes. The clock
-// in milliseconds and the clock in microseconds both wrap during the day. R4_DAY_HOURS sets its
-// length (8 by default), and R4_SEED its incidents.
+// in milliseconds and the clock in microseconds both wrap during the day. R4_DAY_HOURS sets the
+// length of the day (8 by default), and R4_SEED selects the incidents.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,8 +39,8 @@ constexpr SafeReason reasons[] = {SafeReason::fault,  SafeReason::fault,     Saf
                                   SafeReason::handle, SafeReason::proximity, SafeReason::link,
                                   SafeReason::stop,   SafeReason::watchdog};
 
-// The time from the incident until the outputs are safe. It depends on how the board detects the
-// incident.
+// The time from the incident until the outputs are safe. This time depends on how the board detects
+// the incident.
 std::uint32_t limit_ms(Incident incident) {
   switch (incident) {
     case Incident::chip_off:
@@ -234,8 +234,8 @@ class Day final : private firmware::Port {
     ended_ms_ = passed_ms_;
   }
   // True if every output that the board can reach is off. A chip that does not answer keeps its
-  // outputs, and so do all chips on a held bus. For this case there are the relay of the dead-man's
-  // handle and the emergency switch.
+  // outputs, and each chip on a held bus keeps its outputs. For these outputs there are the relay
+  // of the dead-man's handle and the emergency switch.
   bool all_off() {
     sim::ChipPins pins = board_.pins();
     const sim::ChipPins safe = sim::ChipPins::safe();
@@ -320,7 +320,7 @@ TEST(BoardDay, EveryIncidentEndsSafeAndTheBoardDrivesAgain) {
   std::printf("%llu states in %llu ms, %d off the grid; %d incidents\n",
               static_cast<unsigned long long>(day.states),
               static_cast<unsigned long long>(day.passed_ms()), day.wrong_states, next);
-  // States may miss the grid of 10 ms once after each outage of the link or the loop.
+  // States may leave the grid of 10 ms once after each outage of the link or the loop.
   EXPECT_LE(day.wrong_states, 1 + day.incidents[static_cast<int>(Incident::silence)] +
                                   day.incidents[static_cast<int>(Incident::hang)]);
 }

@@ -2,10 +2,10 @@
 // How long an emergency stop takes on a bus that is exact to the bit. Eight boards run the
 // firmware's application on their CAN nodes. A host stops all boards with one frame.
 //
-// The host's controller has a mailbox that only the stop uses, or it is a FIFO. In a FIFO the stop
-// is sent after all waiting frames. A board's loop takes the received frames, calls the application
-// when it is due, and fills its controller. The loop runs at least once a millisecond, at its own
-// times. It keeps one mailbox free of telemetry.
+// The host's controller has a mailbox that only the stop uses, or the controller is a FIFO. In a
+// FIFO the stop is sent after all waiting frames. A board's loop takes the received frames, calls
+// the application when it is due, and fills its controller. The loop runs at least once a
+// millisecond, at its own times, and keeps one mailbox free of telemetry.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -207,9 +207,9 @@ class StoppingHost {
 
 using Boards = std::vector<std::unique_ptr<StoppedBoard>>;
 
-// Makes all boards drive again. A board obeys an E:CLEAR only if it names the newest stop that the
-// board has reported. The report may be lost when all boards report their stop at once, so the
-// E:CLEAR is repeated.
+// Makes all boards drive again. A board obeys an E:CLEAR only if the E:CLEAR names the newest stop
+// that the board has reported. The report may be lost when all boards report their stop at once, so
+// the E:CLEAR is repeated.
 void drive(CanBusModel& bus, const Boards& boards, StoppingHost& host) {
   for (int attempt = 0; attempt < 20; ++attempt) {
     for (int board = 0; board < board_count; ++board) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Days of a fleet of a hundred boards in virtual time: the application of each board and the
-// session of its host. The network between them loses a tenth of the datagrams. Faults affect one
-// link or all links. The memory does not grow. A board trips only after a fault, is safe in time,
-// and becomes active again. R4_FLEET_HOURS sets the length (168 are seven days), and R4_SEED
-// another run.
+// session of its host. The network between boards and hosts loses a tenth of the datagrams. Faults
+// affect one link or all links. The memory does not grow. A board trips only after a fault, is safe
+// in time, and becomes active again. R4_FLEET_HOURS sets the length (168 are seven days), and
+// R4_SEED selects another run.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -253,8 +253,8 @@ TEST(FleetDays, MemoryDoesNotGrowAndFalseTripsAreRare) {
   for (std::size_t i = 0; i < fleet_size; ++i) {
     fleet.push_back(std::make_unique<FleetLink>(random.next()));
   }
-  // In each hour there is one fault of all links and one fault of each link. A short run has them
-  // sooner.
+  // In each hour there is one fault of all links and one fault of each link. In a short run the
+  // faults occur sooner.
   const std::uint64_t interval = std::min<std::uint64_t>(3600, seconds / 3);
   std::uint64_t faults = 0, restarts = 0;
   std::size_t heap = 0;

@@ -68,8 +68,8 @@ void add(Report& sum, const Report& report) {
   sum.worst_silence_us = std::max(sum.worst_silence_us, report.worst_silence_us);
 }
 
-// The number of schedules: R4_SCHEDULES or the default, divided by `part`. With 200 or more, every
-// event under test occurs.
+// The number of schedules: R4_SCHEDULES or the default, divided by `part`. With 200 schedules or
+// more, every event under test occurs.
 std::uint64_t schedules_for(std::uint64_t part) {
   return std::max<std::uint64_t>(from_environment("R4_SCHEDULES", 30'000) / part, 200);
 }
@@ -149,7 +149,7 @@ Report run_all(std::uint64_t schedules, World::Beside beside) {
   EXPECT_GT(sum.executed_signed, schedules / 10);
   EXPECT_GT(sum.strangers, 5 * schedules);
   EXPECT_GT(sum.strangers_sessions, schedules / 100);
-  // Rare: with a few hundred schedules this only shows that the event occurs.
+  // The event is rare, so a few hundred schedules only show that the event occurs.
   EXPECT_GT(sum.strangers_executed, schedules < 4000 ? 0 : schedules / 400);
   EXPECT_GT(sum.leases, schedules / 10);
   EXPECT_GT(sum.watched, schedules);
@@ -198,11 +198,11 @@ TEST(LinkSimulation, KeepsEveryPromiseForSeedsThatOnceFailed) {
   // 18012: a BUSY from before a path joined must not hold commands back.
   // 98796, 103256: before the session's first heartbeat, a path's answer is from before a restart
   // that another path shows.
-  // 104104, 115880: a path reports late that the board boots. Other paths have reported it earlier,
-  // and nothing since.
+  // 104104, 115880: a path reports late that the board boots. Other paths have reported the boot
+  // earlier, and nothing since.
   // 271382, 446043: as 104104, but the other paths are silent.
-  // 756480: a heartbeat must not confirm a farewell if its millisecond is that of a state from
-  // before the farewell.
+  // 756480: if a state from before a farewell has the millisecond of a heartbeat, the heartbeat
+  // must not confirm the farewell.
   for (const std::uint64_t seed :
        {415U, 18012U, 98796U, 103256U, 104104U, 115880U, 271382U, 446043U, 756480U}) {
     EXPECT_EQ(World(seed, false, World::Beside::paths).run().violation, "") << "seed " << seed;

@@ -46,15 +46,15 @@ class PilotRun {
   void pass(int ms) {
     for (; ms > 0; --ms) pass_millisecond();
   }
-  // Presses and releases Start. This arms the board, unless it refuses.
+  // Presses and releases Start. If the board does not refuse, the board is then armed.
   void press_start() {
     start = true;
     pass(200);
     start = false;
     pass(300);
   }
-  // The distance that the car rolls until it stops. It must stop within `seconds` and stay stopped
-  // for two seconds.
+  // The distance that the car rolls until it stops. The car must stop within `seconds` and stay
+  // stopped for two seconds.
   double rolls_m(int seconds = 10) {
     const double from_m = model.travelled_m();
     int standing_ms = 0;

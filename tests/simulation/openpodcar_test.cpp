@@ -27,8 +27,8 @@ using control::LoopEnd;
 constexpr VirtualRobot::Link podcar_link{.delay_us = 5000, .jitter_us = 2000, .loss = 0.01};
 constexpr double board_timeout_s = 1.0;
 
-// The program in main.cpp, with a session in place of a board. Its steps are the steps of the
-// program.
+// The program in main.cpp, with a session in place of a board. Each step of PodcarRun is a step of
+// the program.
 class PodcarRun {
  public:
   explicit PodcarRun(Course given, std::uint64_t seed = 1)
@@ -62,7 +62,7 @@ class PodcarRun {
   double deviation() const {
     return std::abs(course.deviation_m(model.place().x_m, model.place().y_m));
   }
-  // The distance that the car rolls until it stops. It must stop within ten seconds and stay
+  // The distance that the car rolls until it stops. The car must stop within ten seconds and stay
   // stopped for two seconds.
   double rolls_m() {
     const double from_m = model.travelled_m();

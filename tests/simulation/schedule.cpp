@@ -82,7 +82,7 @@ Schedule Schedule::random(Random& random) {
   return s;
 }
 
-// Watchers begin and end. Sometimes the board has too few places for them.
+// Watchers begin and end. Sometimes the board has too few places for the watchers.
 void Schedule::add_watchers(Random& random) {
   watchers = static_cast<int>(random.between(1, 6));
   for (int i = 0; i < watchers; ++i) {

@@ -38,8 +38,8 @@ struct Happening {
     leave,          // the host process sends a farewell, ends, and restarts after `length_us`
     watch,          // a program watches for `length_us`; `host` is its number
     watcher_stops,  // a watcher sends an emergency stop
-    // The host's end of a path is disconnected for `length_us`, and the system reports it. The
-    // board's port is also disconnected if each path has its own port.
+    // The host's end of a path is disconnected for `length_us`, and the system reports the change.
+    // If each path has its own port, the board's port is also disconnected.
     unplug,
     stall,  // datagrams sent on a path wait until `length_us` has passed
   };
@@ -71,12 +71,12 @@ struct Schedule {
   // true: all paths are peers at one port of the board; false: each path has its own port
   bool one_port = false;
   // An hour before the scenario, the first host controlled the board for a second. This path
-  // replays the datagrams of the second in both directions. -1: no path replays them.
+  // replays the datagrams of that second in both directions. -1: no path replays datagrams.
   int replaying_path = -1;
   bool reboots_after_capture = false;
   int attacked_path = 0;
   // A stranger (stranger.hpp) on the attacked path sends about this often while a host is in
-  // control. At other times it sends only the share `stranger_claims`. 0: there is no stranger.
+  // control. At other times the stranger sends only the share `stranger_claims`. 0: no stranger.
   std::uint32_t stranger_interval_us = 0;
   double stranger_claims = 0;
   std::vector<Happening> happenings;
@@ -86,7 +86,7 @@ struct Schedule {
   double post_share = 0;                // share of commands sent without a confirmation
   double group_share = 0;               // share of groups, with the same target for all steppers
   std::uint32_t board_lateness_us = 0;  // the board's loop runs up to this much late
-  // How much the board's clock is faster than the clocks of the hosts, or slower if negative.
+  // How much faster the board's clock is than the clocks of the hosts. Negative: slower.
   std::int64_t board_drift_ppm = 0;
   static constexpr std::int64_t most_drift_ppm = 100;
   // With an attacker the board has a key for each host. The attacker acts about this often. 0: no

@@ -18,7 +18,7 @@ class World::Script {
   virtual void end() = 0;
   // An event that the script has requested.
   virtual void on_event(int index) = 0;
-  // Called after each event.
+  // Is called after each event.
   virtual void check() = 0;
 
   virtual void set(SessionOptions& options) const = 0;
@@ -27,7 +27,7 @@ class World::Script {
 
   // A host or the board has sent this datagram. The script delivers it.
   virtual void on_sent(const Packet& sent) = 0;
-  // A datagram has arrived. True if the script keeps it from its receiver for now.
+  // A datagram has arrived. True if the script holds this datagram back for now.
   virtual bool takes(const Packet& arrived) = 0;
   virtual void before_board(const Packet& packet) = 0;
   virtual void after_board(const Packet& packet) = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A stranger has no key and does not receive any host's datagrams, so it has no session's SID. It
-// receives the datagrams that the board sends to watchers and to everyone, and the answers to its
-// own datagrams. Its guesses of packet numbers are good.
+// A stranger has no key and does not receive any host's datagrams, so it has no session's SID. The
+// stranger receives the datagrams that the board sends to watchers and to everyone, and the answers
+// to its own datagrams. The stranger's guesses of packet numbers are good.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +27,8 @@ class Stranger {
   // next.
   std::string say(Random& random, std::uint32_t next);
 
-  // Returns `next` if the stranger has a number near it. Otherwise it returns the number after its
-  // newest CMD.
+  // If the stranger has a number near `next`, returns `next`. Otherwise returns the number after
+  // the stranger's newest CMD.
   std::uint32_t guess(std::uint32_t next) const;
   // The T of the newest heartbeat. 0: no heartbeat yet.
   std::uint32_t echo() const { return echo_; }
@@ -36,8 +36,8 @@ class Stranger {
   std::int32_t cause() const { return cause_; }
   // The token that the stranger must echo for its lease.
   std::uint32_t lease() const { return lease_; }
-  // The field SID with which the stranger may pass for the host. Empty if the board has sent it no
-  // SID.
+  // The field SID with which the stranger may pass for the host. Empty if the stranger has received
+  // no SID.
   const std::string& name() const { return name_; }
 
  private:

@@ -31,7 +31,7 @@ class SharedBus {
   };
 
   // Frames follow each other, at 1 Mbit/s. A packed frame has 32 characters and takes 110 us.
-  // Reading a frame takes up to half of this time. This gives the load of docs/how-to/can.md.
+  // Reading a frame takes up to half of this time. These times give the load of docs/how-to/can.md.
   void put(std::uint64_t now_us, std::size_t board, bool to_board, std::string_view bytes) {
     const std::uint64_t frames = bytes.size() / 32 + 1;
     free_us_ = std::max(free_us_, now_us) + 110 * frames;

@@ -2,12 +2,12 @@
 // The link simulator: the shipped application of the board and the shipped session of the host,
 // joined by a faulty channel in virtual time. One seed gives one run, to the last byte.
 //
-// While it runs it checks the promises of docs/design/safety-argument.md. It stops at the first
-// broken promise:
+// During a run, the simulator checks the promises of docs/design/safety-argument.md. The simulator
+// stops at the first broken promise:
 //    silence    outputs are live only while intact heartbeats of the host in control arrive. The
 //               last heartbeat arrived at most timeout + 20 ms ago, even if it waited before the
-//               board read it. It was sent at most 2 timeouts + 20 ms ago. Exception: a board whose
-//               loop does not run, until its first turn.
+//               board read it. The last heartbeat was sent at most 2 timeouts + 20 ms ago.
+//               Exception: a board whose loop does not run, until its first turn.
 //    once       no command is executed twice, even if the board restarts.
 //    whole      a group of commands is executed as a whole or not at all, and reaches the hardware
 //               at once.
@@ -15,11 +15,11 @@
 //               executed stop.
 //    intact     an executed command is as a host sent it, and this host controls the board.
 //    fresh      an executed command was sent at most 2 timeouts + 250 ms before.
-//    late       no command is executed if a heartbeat that fed overtook it more than 250 ms before.
+//    late       a command is not executed more than 250 ms after a heartbeat that fed overtook it.
 //    truth      a confirmed command was executed. A refused command was not executed, and is not
 //               executed later.
 //    stop       if a stop is confirmed, the board has obeyed the same stop. No E:CLEAR clears a
-//               stop that came after the E:CLEAR was requested.
+//               stop that is newer than the request for the E:CLEAR.
 //    farewell   the board obeys only the farewell of the process in control, at once. If a farewell
 //               is confirmed, the board has obeyed it.
 //    restore    restored outputs belong to a host that was alive a timeout ago.
@@ -29,12 +29,13 @@
 //               session of a host, no datagram of the stranger is executed, makes a path or uses up
 //               a number. While no host is in control, the stranger may begin a session as any host
 //               may. The session belongs to the process whose heartbeat began it. Each SID of the
-//               stranger, and each address without a SID, counts as a separate process. A new
+//               stranger, and each address without a SID, is treated as a separate process. A new
 //               session has executed no command, and its SESSION is the number of the heartbeat
 //               that began it. A session with another SESSION was resumed.
 //    kept       a host keeps the board while its heartbeats arrive in time with new numbers and
-//               fresh echoes. With keys (a signature may be late) it keeps the board while its
-//               heartbeats feed. Not checked with standstills, because a heartbeat may have waited.
+//               fresh echoes. With keys (a signature may be late) a host keeps the board while its
+//               heartbeats feed. With standstills there is no check, because a heartbeat may have
+//               waited.
 //    owned      the process in control commanded the outputs that are live.
 //    watch      the host in control and at most four other peers get each state once. Each of these
 //               peers has echoed, at most a lease ago, a token that the board sent to it. Without a
@@ -48,8 +49,8 @@
 //               there is such a path, there is no false trip, and no command times out that had
 //               enough time on this path alone. The newest state is never older than the newest
 //               state of this path, nor older than two periods and the path's delay. Another path
-//               that meets the limits for 2.5 s is also used. The host does not report BUSY while
-//               it has used such a path for 0.4 s without a BUSY on it.
+//               that meets the limits for 2.5 s is also used. While the host has used such a path
+//               for 0.4 s without a BUSY on it, the host does not report BUSY.
 #pragma once
 
 #include <compare>
@@ -337,7 +338,7 @@ class World : public firmware::Hal, public firmware::Observer {
   std::uint32_t stop_pnum_ = 0;
   int newest_executed_ = -1;
   bool stopped_ = false;
-  std::uint64_t new_stop_us_ = 0;  // when the newest stop came that does not repeat an earlier stop
+  std::uint64_t new_stop_us_ = 0;  // time of the newest stop that does not repeat an earlier stop
   std::map<Process, std::uint64_t> clear_asked_us_;
   std::uint32_t next_peer_ = 1;
 

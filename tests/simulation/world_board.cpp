@@ -19,9 +19,9 @@ bool driven(const firmware::Outputs& outputs) { return outputs != firmware::Outp
 
 }  // namespace
 
-// The board's clock begins at random. Once in 200,000 boots it is within 10 s of the earlier clock
-// by chance. A replay from the earlier boot then passes for a datagram of this boot
-// (docs/design/safety-argument.md). This is not an error.
+// The board's clock begins at random. Once in 200,000 boots, the clock begins by chance within 10 s
+// of the earlier clock. A replay from the earlier boot then passes for a datagram of this boot
+// (docs/design/safety-argument.md). This replay is not an error.
 std::uint32_t World::first_time() {
   constexpr std::int32_t apart_ms = 60'000;
   std::uint32_t first = 0;
@@ -85,7 +85,7 @@ void World::stand_still(const Standstill& standstill) {
   at(now_us_ + standstill.length_us, Event::Kind::go_on, 0, ++board_generation_);
 }
 
-// Models a process with several sockets. Its timer may fire before, between or after the waiting
+// Models a process with several sockets. The timer may fire before, between or after the waiting
 // datagrams. The process may not notice that it has read all datagrams.
 void World::go_on() {
   note("board goes on");
@@ -279,7 +279,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   }
   const std::uint32_t unseen_ms =
       schedule_.standstills.empty() ? 0 : firmware::Application::standstill_ms;
-  // Measured by the board's clock, which may be slow.
+  // The board's clock, which may be slow, measures this time.
   const std::uint64_t overtaken_us = (BoardLink::late_limit_ms + unseen_ms + 1) * 1001U;
   for (const Fed& fed : fed_) {
     const bool overtook = fed.from == delivering_ && newer(fed.pnum, pnum);
@@ -299,8 +299,7 @@ bool World::controls(const Process& process) const {
   return board_->link().has_owner() && !fed_.empty() && fed_.back().from == process;
 }
 
-// The board has handled a command. If the board executed it, it must have executed the whole
-// command.
+// The board has handled a command. The board must have executed the whole command or nothing.
 void World::check_whole(int id) {
   const Sent& sent = commands_[static_cast<std::size_t>(id)];
   const std::uint8_t all = sent.group ? (1U << stepper_channels) - 1 : 1;

@@ -104,7 +104,7 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
           packet.bytes.erase(random_.below(packet.bytes.size()), 1);
           break;
       }
-      // The datagram is intact if only the case of a checksum digit changed.
+      // If only the case of a checksum digit changed, the datagram is intact.
       Datagram changed;
       const std::size_t content = bytes.find('^');
       packet.intact = read_datagram(Text(packet.bytes), changed) &&

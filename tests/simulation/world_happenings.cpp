@@ -103,7 +103,7 @@ void World::leave(Host& host) {
   poll_host(host.index);
 }
 
-// Sends E:CLEAR if the host has received the cause of the safe state.
+// If the host has received the cause of the safe state, sends E:CLEAR.
 void World::clear_stop(Host& host) {
   if (!host.session->knows_cause() || host.clear_ticket != 0) return;
   clear_asked_us_[{host.index, host.incarnation}] = now_us_;
@@ -138,7 +138,7 @@ void World::attack() {
   }
   const BoardLink& link = board_->link();
   const BoardLinkState state = link.state();
-  board_->poll(board_ms());  // a link lost by silence must not count for the attacker
+  board_->poll(board_ms());  // the attacker does not cause the loss of a silent link
   const bool lost = link.state() != state;
   const std::uint32_t fed_ms = link.fed_ms();
   const Source source{port, address};

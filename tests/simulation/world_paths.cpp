@@ -181,9 +181,9 @@ bool World::serves_since(std::uint64_t at_us) const {
   });
 }
 
-// True if a good path was in use when the command was requested, and for so long before that
-// earlier BUSY have expired and the host's F was confirmed. Then the command arrives on this path.
-// The state that confirms the command, or the answer to a duplicate, also arrives on it.
+// True if a good path was in use when the command was requested, and before, for so long that
+// earlier BUSY have expired and F was confirmed. Then the command arrives on this path. The state
+// that confirms the command, or the answer to a duplicate, also arrives on this path.
 bool World::should_be_confirmed(const Sent& sent) const {
   const std::uint64_t there_and_back_us =
       2 * most_delay_us + schedule_.settings.state_period_ms() * 1000U;

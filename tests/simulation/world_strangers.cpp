@@ -37,12 +37,12 @@ void World::on_board_heartbeat(std::string_view bytes) {
   if (shown_.size() > most_shown) shown_.erase(shown_.begin());
 }
 
-// The stranger's datagrams arrive undamaged and at once. Some come from the address of a host.
+// The stranger's datagrams arrive undamaged and at once. Some datagrams have a host's address.
 void World::stranger() {
   at(now_us_ + stranger_random_.between(1, 2ULL * schedule_.stranger_interval_us),
      Event::Kind::stranger, 0);
   if (standing_) return;
-  board_->poll(board_ms());  // a link lost by silence must not count for the stranger
+  board_->poll(board_ms());  // the stranger does not cause the loss of a silent link
   const BoardLink& link = board_->link();
   const bool had_owner = link.has_owner();
   const Process owner = fed_.empty() ? Process() : fed_.back().from;
@@ -105,9 +105,9 @@ void World::on_strangers(const Command& command) {
   if (command.kind == CommandKind::clear) stopped_ = board_->reason() == SafeReason::stop;
 }
 
-// True if this is the newest heartbeat of the host in control and it comes in time. It must also
-// echo a recent heartbeat of the board that is younger than the timeout. With keys and with
-// standstills the result is uncertain, so it is false.
+// True if this is the newest heartbeat of the host in control, is in time, and echoes a recent
+// heartbeat of the board that is younger than the timeout. With keys and with standstills the
+// result is uncertain, so the function returns false.
 bool World::has_to_feed(const Packet& packet) const {
   if (has_keys() || !schedule_.standstills.empty() || packet.host < 0) return false;
   if (!packet.intact || !packet.heartbeat) return false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Programs that watch the board, and a program that requests leases in the name of other programs.
-// Also the promise about the receivers of the board's states.
+// Programs that watch the board, a program that requests leases in the name of other programs, and
+// the promise about the receivers of the board's states.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -45,7 +45,7 @@ void World::watch(Host& watcher, bool over) {
   watcher.die();
 }
 
-// The forger knows the board's clock, and the tokens that were sent to other peers.
+// The forger has the board's clock, and the tokens that were sent to other peers.
 void World::forge_lease() {
   at(now_us_ + random_.between(1, 2ULL * schedule_.forge_interval_us), Event::Kind::forge, 0);
   if (standing_) return;
@@ -80,7 +80,7 @@ void World::forge_lease() {
       }
       break;
   }
-  if (leases_[victim].tokens_us.contains(echo)) return;  // the forger cannot know this token
+  if (leases_[victim].tokens_us.contains(echo)) return;  // the forger cannot have this token
   ++report_.forged_leases;
   const std::string bytes =
       test::with_crc(fmt::format("W:{};PNum:{};T:{};", random_.below(1001), pnum, echo));

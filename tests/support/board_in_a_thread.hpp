@@ -32,7 +32,7 @@ class BoardInAThread {
   const std::string& url() const { return urls_[0]; }
   const std::vector<std::string>& urls() const { return urls_; }
 
-  // Switches the board off. Its transport disappears.
+  // Switches the board off, so that its transport disappears.
   void switch_off();
 
   void run(const std::function<void(sim::SimulatedBoard&)>& action);

@@ -30,8 +30,8 @@ constexpr std::uint64_t drain_ns = 200000000;  // for datagrams under way at the
 struct Message {
   std::string plain;
   std::uint64_t due_ns = 0;
-  bool state = false;      // a newer state replaces a waiting one
-  bool heartbeat = false;  // of the host
+  bool state = false;      // a newer state replaces a waiting state
+  bool heartbeat = false;  // a heartbeat of the host
 };
 
 // Writes the next datagrams of a board and its host, with numbers as some hours after the start.

@@ -9,12 +9,13 @@
 //     bus.run_until(1'000'000'000);
 //     bus.load();                             // busy time / time
 //
-// The model follows ISO 11898-1:2015. It has arbitration by id among the frames that wait when the
-// bus becomes idle (10.4.2.2), and the bits of each frame (can_bits.hpp). It has error frames and
-// retransmission (10.4.4), error counters, and error-passive nodes with 8 bits of suspended
-// transmission. It has bus-off and the return after 128 times 11 recessive bits (12.1.4). The model
-// leaves out bit errors within a frame, overload frames, clock differences, and the propagation
-// delay. Every error is an error of the CRC or of the acknowledgement, and all nodes see it.
+// The model follows ISO 11898-1:2015: arbitration by id among the frames that wait when the bus
+// becomes idle (10.4.2.2), and the bits of each frame (can_bits.hpp). The model has error frames
+// and retransmission (10.4.4), error counters, and error-passive nodes with 8 bits of suspended
+// transmission. The model has bus-off and the return after 128 times 11 recessive bits (12.1.4).
+// The model leaves out bit errors within a frame, overload frames, clock differences, and the
+// propagation delay. Every error is an error of the CRC or of the acknowledgement, and all nodes
+// see the error.
 //
 // Times are nanoseconds from 0. The same options and the same calls give the same run.
 #pragma once
@@ -48,10 +49,10 @@ struct CanNodeOptions {
   std::size_t room = 3;    // number of frames that can wait
   bool silent = false;     // only receives: does not acknowledge and does not count errors
   bool comes_back = true;  // returns from bus-off without a command
-  // Called at the end of a frame, before its intermission. `sent`: after a frame of this node,
-  // before the receivers are called. `received`: after a frame of another node. `failed`: after an
-  // error frame. `changed`: after a change of state. All nodes see the error frame of a damaged
-  // frame. Only the sender sees the error frame of a missing acknowledgement.
+  // These functions are called at the end of a frame, before its intermission. `sent`: after a
+  // frame of this node, before the receivers are called. `received`: after a frame of another node.
+  // `failed`: after an error frame. `changed`: after a change of state. All nodes see the error
+  // frame of a damaged frame. Only the sender sees the error frame of a missing acknowledgement.
   std::function<void(const CanFrame&)> sent = {};
   std::function<void(const CanFrame&)> received = {};
   std::function<void(CanBusError)> failed = {};
@@ -75,7 +76,7 @@ class CanBusModel {
   // All nodes see the next `count` frames damaged.
   void corrupt_next(unsigned count) { corrupt_next_ = count; }
   void set_corrupted(double probability) { options_.corrupted = probability; }
-  // All nodes see the frames of this node damaged, so that it goes bus-off.
+  // All nodes see the frames of this node damaged, so that this node goes bus-off.
   void spoil(int node, bool spoiled) { to_node(node).spoiled = spoiled; }
   // Connects the node to the bus or disconnects it. A disconnected node does not send, receive or
   // acknowledge. A frame that is on the bus ends first.

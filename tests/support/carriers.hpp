@@ -11,7 +11,7 @@
 
 namespace r4::test {
 
-// A carrier that is up while it is open. It discards sent datagrams and receives none.
+// A carrier that is up while it is open, discards sent datagrams and receives no datagram.
 class IdleCarrier : public Carrier {
  public:
   void open(Handler& handler) override {

@@ -20,7 +20,7 @@ const std::vector<CapturedLine>& paper_capture();
 // The first line of the capture, a state of 156 bytes.
 std::string captured_state();
 
-// `fields`, followed by "^0x<crc>^"; the fields are not checked.
+// `fields`, followed by "^0x<crc>^". The fields are not checked.
 std::string with_crc(std::string_view fields);
 
 std::string str(Text text);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that performs its effects at the end of each call, as in AsyncBoard. It passes its
-// datagrams to transmit(), then its events to the functions with their names.
+// A session that performs its effects at the end of each call, as in AsyncBoard. The session passes
+// its datagrams to transmit(), then its events to the functions with their names.
 #pragma once
 
 #include <optional>

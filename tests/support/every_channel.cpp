@@ -18,7 +18,7 @@ sim::Pins pins_of(const ControlledBoard& board) {
   return pins;
 }
 
-// The first state for which `is_so` is true. The last state if there is no such state.
+// The first state for which `is_so` is true. If there is no such state: the last state.
 State await(const ControlledBoard& board, const std::function<bool(const State&)>& is_so) {
   State state;
   for (int tries = 0; tries < 1000; ++tries) {
@@ -29,7 +29,7 @@ State await(const ControlledBoard& board, const std::function<bool(const State&)
   return state;
 }
 
-// Whole turns and a part of a turn, different for each encoder; encoders 2 and 4 turn backwards.
+// Whole turns and a part of a turn, different for each encoder. Encoders 2 and 4 turn backwards.
 std::int32_t turns_of(int channel) {
   return (channel % 2 == 0 ? -channel : channel) * sim::BoardModel::counts_a_turn;
 }

@@ -20,7 +20,7 @@ class First {
   void set(Value value) const {
     if (!state_->is_set.exchange(true)) state_->promise.set_value(std::move(value));
   }
-  // Fails the test if there is no value within 5 s. May be called once.
+  // If there is no value within 5 s, the test fails. May be called once.
   Value get() const {
     auto future = state_->promise.get_future();
     if (future.wait_for(std::chrono::seconds{5}) == std::future_status::ready) return future.get();

@@ -29,7 +29,7 @@ class Hold {
   void release() { turn_->reach(Turn::Stage::released); }
 
  private:
-  // Shared, so that it exists while either thread uses it.
+  // This object is shared, so that it exists while either thread uses it.
   class Turn {
    public:
     enum class Stage : std::uint8_t { free, wanted, held, released };

@@ -13,7 +13,7 @@ namespace {
 using Clock = ReceivedState::Clock;
 using namespace std::chrono_literals;
 
-// The time at which the board's clock began to show t_ms. It may be up to `width` too late.
+// The time at which the board's clock began to show t_ms. This time may be `width` too late.
 struct ClockEdge {
   std::uint32_t t_ms = 0;
   Clock::time_point at;

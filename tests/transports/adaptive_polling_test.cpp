@@ -48,7 +48,7 @@ TEST_F(AdaptivePollingTest, SleepsAfterALongSilence) {
   EXPECT_TRUE(worthwhile_after(Silence::between, 0us));
 }
 
-// A state every 10 ms. Its frames follow each other at once.
+// A state every 10 ms. The frames of a state follow each other at once.
 TEST_F(AdaptivePollingTest, DistinguishesASilenceWithinATransferFromOneBetween) {
   silence(Silence::within, 15us);
   silence(Silence::between, 10ms);

@@ -23,7 +23,7 @@ namespace r4::test {
 using Clock = std::chrono::steady_clock;
 using Kind = CarrierEvent::Kind;
 
-// Long enough: a test that waits for this time has failed.
+// A test that waits for this time has failed.
 inline constexpr std::chrono::seconds patience{5};
 
 class Recorder final : public Carrier::Handler {
@@ -111,7 +111,7 @@ inline std::unique_ptr<Carrier> open_carrier(asio::io_context& io, const std::st
   return carrier;
 }
 
-// The Error that `action` throws. None if it throws no Error.
+// The Error that `action` throws. Empty if `action` throws no Error.
 template <class Action>
 std::optional<Error> error_of(Action action) {
   try {
@@ -124,7 +124,7 @@ std::optional<Error> error_of(Action action) {
 
 std::size_t open_descriptors();
 
-// Runs `action` in a child process. Returns its exit status, or 126 if a signal ended it.
+// Runs `action` in a child process, and returns its exit status. If a signal ended the child: 126.
 int run_in_child(const std::function<int()>& action);
 
 // Like run_in_child(), as user nobody without privileges.

@@ -4,9 +4,9 @@
 //
 //     r4_bridge_bench [R4, default build/r4] [datagrams, default 4000]
 //
-// Exit code 1 if a limit is missed. UDP to a pty and back with datagrams of 170 bytes: at most 1.15
-// times the forwarder's median one-way time, and at most 1.3 times its processor time. UDP to UDP:
-// at least 100,000 datagrams a second, none reordered.
+// If a limit is not met, the exit code is 1. UDP to a pty and back with datagrams of 170 bytes: at
+// most 1.15 times the forwarder's median one-way time, and at most 1.3 times the forwarder's
+// processor time. UDP to UDP: at least 100,000 datagrams a second, in order.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <poll.h>

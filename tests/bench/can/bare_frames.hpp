@@ -21,7 +21,7 @@ constexpr int frames_of(std::size_t size) {
 enum class Wait { sleeping, looking };
 const char* to_text(Wait wait);
 
-// Answers a question: flow control after its first frame, then the frames of the answer.
+// Answers a question: sends flow control after the question's first frame, then the answer.
 class BareEchoProcess : public ChildProcess {
  public:
   BareEchoProcess(Wait wait, int question_frames, int answer_frames);
@@ -30,8 +30,8 @@ class BareEchoProcess : public ChildProcess {
 // Seconds of each of `count` round trips with a BareEchoProcess with the same numbers of frames.
 std::vector<double> bare_round_trips(Wait wait, int question_frames, int answer_frames, int count);
 
-// Sends datagrams of this many frames as fast as possible. In the dialogue it polls for flow
-// control after the first frame of each datagram.
+// Sends datagrams of this many frames as fast as possible. In the dialogue the sender polls for
+// flow control after the first frame of each datagram.
 class BareSenderProcess : public ChildProcess {
  public:
   BareSenderProcess(Lane lane, int frames);

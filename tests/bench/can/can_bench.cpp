@@ -9,12 +9,12 @@
 // with datagrams of the same sizes. Then our carriers replace the sockets. Throughput: datagrams of
 // 170 bytes in one direction. Our two ends use the packed form, the default, which needs fewer
 // frames for the same datagrams. The kernel carries the plain datagrams. The kernel and our stack
-// take turns. The median of the ratios of all rounds counts. Exit code 1 if a limit is missed:
-// round trip p50 at most 1.2 times the kernel's, throughput at least the kernel's.
+// take turns. The result is the median of the ratios of all rounds. If a limit is not met, the exit
+// code is 1: round trip p50 at most 1.2 times the kernel's, throughput at least the kernel's.
 //
-// Also measured, without a limit, to show where the time is spent: our plain form (pack=0); bare
-// frames, the best that a program with its own ISO-TP can reach; async_send, with the whole stack
-// above the carriers and simulated chips on the board.
+// Without a limit, the benchmark also measures our plain form (pack=0), bare frames and async_send.
+// Bare frames are the best that a program with its own ISO-TP can reach. async_send has the whole
+// stack above the carriers, and simulated chips on the board.
 #include <algorithm>
 #include <array>
 #include <asio/io_context.hpp>
@@ -107,7 +107,7 @@ std::string make_command() {
 
 // --- round trip
 
-// Sends each command after the state that confirms the command before it.
+// Sends each command after the state that confirms the previous command.
 class Host {
  public:
   explicit Host(const std::string& url) : board_(io_, url, test::at_will()) { board_.open(); }
@@ -217,7 +217,7 @@ std::vector<double> kernel_round_trips(test::KernelIsotp& dialogue, test::Kernel
   return seconds;
 }
 
-// Both our ends of one form, and their results.
+// Our two ends with one form, and the results.
 struct Ours {
   explicit Ours(Form which) : form(which), board(which), host(host_url(which)) {}
 

@@ -24,14 +24,14 @@ const char* to_text(Form form);
 enum class Above { all, nothing };
 std::string host_url(Form form, Above above = Above::all);
 std::string board_url(Form form,
-                      Above above = Above::all);  // a URL does not say if a board packs
+                      Above above = Above::all);  // a URL does not state whether a board packs
 
 // The kernel's sockets for the two lanes of a node, for either end.
 test::KernelIsotp kernel_dialogue(bool board);
 test::KernelIsotp kernel_telemetry(bool board);
 
-// A simulated board whose clock stops while a round trip is measured. Each command that it executes
-// advances the clock to the time of the next state, which confirms the command.
+// A simulated board whose clock stops while a round trip is measured. Each command that the board
+// executes advances the clock to the time of the next state, which confirms the command.
 class CanBoardProcess : public ChildProcess {
  public:
   // The datagrams sent, in the plain form that the program uses.
@@ -53,7 +53,7 @@ class CanBoardProcess : public ChildProcess {
   [[noreturn]] void serve(Form form) const;
 };
 
-// A carrier of ours on the board's side. It answers each datagram of a host with `state`.
+// A carrier of ours on the board's side, which answers each datagram of a host with `state`.
 class CarrierEchoProcess : public ChildProcess {
  public:
   CarrierEchoProcess(Form form, const std::string& state);
@@ -80,7 +80,7 @@ std::uint32_t next_count(int control);
 
 class CanSenderProcess : public ChildProcess {
  public:
-  // On our stack; without a form, on the kernel's.
+  // With a form, sends on our stack. Without a form, sends on the kernel's ISO-TP.
   CanSenderProcess(std::optional<Form> ours, Lane lane, const std::string& datagram);
 
   void begin(std::uint32_t count) const;

@@ -9,11 +9,11 @@
 // Boards, which have one socket each. The boards send states at 1000 Hz, or as fast as the bus
 // allows.
 //
-// Exit code 1 if a limit is missed. With a thousand boards: no datagram is lost. A datagram costs
-// the host no heap. It costs at most 1.25 times the time of a datagram of one board that sends as
-// fast as possible. A board costs the host at most 24 kB. A simulated board costs at most 64 kB,
-// and 6 us a state. The host notices the silence of one board at most 20 ms later than with one
-// board.
+// If a limit is not met, the exit code is 1. With a thousand boards: no datagram is lost. A
+// datagram costs the host no heap, and at most 1.25 times the time of a datagram of one board that
+// sends as fast as possible. A board costs the host at most 24 kB. A simulated board costs at most
+// 64 kB, and 6 us a state. The host notices the silence of one board at most 20 ms later than with
+// one board.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -259,7 +259,7 @@ struct Counts {
   std::uint64_t received = 0, lost = 0;
 };
 
-// Prints the datagrams of `counts()` and the processor time within this time.
+// Prints the datagrams of `counts()` and the processor time during `seconds`.
 void measure_bus(const char* what, const BoardsProcess& boards, std::chrono::seconds seconds,
                  const std::function<Counts()>& counts) {
   std::this_thread::sleep_for(1s);

@@ -22,8 +22,8 @@ Usage own_usage();
 enum class Transport { udp, pty };
 const char* to_text(Transport path);
 
-// A simulated board that sends states at 1000 Hz. If `unbound`, its clock runs as fast as possible,
-// and so does its stream of states.
+// A simulated board that sends states at 1000 Hz. If `unbound`, the board's clock and its stream of
+// states run as fast as possible.
 class BoardProcess : public ChildProcess {
  public:
   BoardProcess(Transport path, bool unbound);

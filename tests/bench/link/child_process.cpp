@@ -15,7 +15,7 @@
 namespace r4::bench {
 namespace {
 
-// Uses the first or second of the cores that this process had at its start, if it had two.
+// If this process had two cores at its start, uses the first or second of these cores.
 void run_on_core(int index) {
   static const cpu_set_t all = [] {
     cpu_set_t set;

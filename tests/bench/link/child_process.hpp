@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A forked process for the other end of a measurement; construct it before the first thread. The
-// benchmark ends if the system refuses a call.
+// A forked process for the other end of a measurement. Construct the process before the first
+// thread. If the system refuses a call, the benchmark ends.
 #pragma once
 
 #include <sys/types.h>
@@ -18,7 +18,7 @@ const char* to_text(Placement placement);
 // Applies to this process, and to processes that are forked later.
 void place(Placement placement);
 
-// Ends the process with perror(what) if not `ok`.
+// If not `ok`, ends the process with perror(what).
 void require(bool ok, const char* what);
 void write_all(int fd, const void* data, std::size_t size);
 void read_all(int fd, void* data, std::size_t size);

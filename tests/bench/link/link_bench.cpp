@@ -5,9 +5,9 @@
 //     r4_link_bench [round-trips a path, default 20000 [part: round-trip, heap or stream]]
 //
 // The plain program and async_send take turns in blocks, so that other load of the machine affects
-// both. Exit code 1 if a limit is missed: asynchronous p50 at most 1.3 times the plain p50, each
-// process on a separate core; no allocation per datagram; at 100 Hz at most 2 % of a core on either
-// side.
+// both programs. If a limit is not met, the exit code is 1: asynchronous p50 at most 1.3 times the
+// plain p50, each process on a separate core; no allocation per datagram; at 100 Hz at most 2 % of
+// a core on either side.
 #include <algorithm>
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
@@ -98,7 +98,7 @@ struct AsyncHost {
     io.restart();
   }
 
-  // Only one thread uses it, so Asio needs no locks.
+  // Only one thread uses this loop, so Asio needs no locks.
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   AsyncBoard board;
 };
@@ -106,7 +106,7 @@ struct AsyncHost {
 // --- round trip
 
 void compare_round_trips(Transport path, int count, bool judged) {
-  // Sizes of Q:ID and of the simulated board's answer, as sent; a line ends with CR LF.
+  // Sizes of Q:ID and of the simulated board's answer, as sent. A line ends with CR LF.
   const std::size_t line_end = path == Transport::udp ? 0 : 2;
   EchoProcess plain(path, 42 + line_end, 55 + line_end);
   BoardProcess board_for_async(path, false);
@@ -164,7 +164,7 @@ void count_allocations(Transport path) {
     host.round_trips(500, seconds);
     host.run_for(1200ms);  // one-time setup is finished after this
 
-    // Starts and ends on the loop, so that the allocations of this function do not count.
+    // Starts and ends on the loop, so that the allocations of this function are not counted.
     struct Count {
       AsyncHost& host;
       std::uint64_t before = 0, made = 0;

@@ -6,7 +6,7 @@
 //
 // Two processes on loopback. One process publishes all topics of a board through the outbox, as r4
 // ros2 does. The other process subscribes. A state and a plain sample take turns, 5 ms apart. Each
-// carries the time at which it was ready.
+// sample carries the time at which the sample was ready.
 #include <dds/dds.h>
 #include <fmt/format.h>
 #include <sys/wait.h>

@@ -101,7 +101,7 @@ TEST_F(ApplicationCommand, AnEchoOfAnotherBootStartsNoSession) {
 
 TEST_F(ApplicationCommand, ACommandRefusedInAnOutageStaysRefused) {
   board.run(1500);
-  const std::uint32_t overtaken = host.pnum++;  // of a heartbeat that arrives after the command
+  const std::uint32_t overtaken = host.pnum++;  // the heartbeat arrives after the command
   const std::uint32_t refused = host.command("O:1,1,1");
   EXPECT_EQ(answers(), Lines{"SAFE"});
   board.receive("H:ROS2-R4;" + test::stamp_of(our_session, overtaken, board.newest_t()), host.at);

@@ -154,7 +154,7 @@ TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuth) {
 }
 
 // docs/reference/protocol.md 4.2: the T of a CONNECTING heartbeat is only for the signature. A host
-// does not echo it.
+// does not echo this T.
 TEST_F(ApplicationKey, AnEchoOfAConnectingHeartbeatStartsNoSession) {
   for (int i = 0; i < 20; ++i) {
     host.listen();
@@ -258,7 +258,7 @@ TEST_F(ApplicationKey, ASignedStopIsANewCauseAfterAForgedStop) {
   const std::string clear = "E:CLEAR," + std::to_string(board.newest_cause());
   ASSERT_EQ(host.pnum, next);
   host.command("E:STOP");
-  host.command(clear);  // made before the stop
+  host.command(clear);  // `clear` is older than the stop
   EXPECT_EQ(board.reason(), SafeReason::stop);
 }
 
@@ -267,7 +267,7 @@ TEST_F(ApplicationKey, ADuplicateOfASignedStopIsNotANewCause) {
   const std::string stop = host.signed_fields(host.fields("E:STOP", host.pnum++));
   board.receive(stop, host.at);
   const std::int32_t cause = board.newest_cause();
-  board.receive(stop, host.at);  // signed for the previous nonce
+  board.receive(stop, host.at);  // the signature has the previous nonce
   board.receive(stop.substr(0, stop.find("A:")), host.at);
   EXPECT_EQ(board.newest_cause(), cause);
 }

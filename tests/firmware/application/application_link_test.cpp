@@ -117,7 +117,7 @@ struct ApplicationStandstill : testing::Test {
     board.run(500);
     board.take();
   }
-  // Milliseconds from now until the board becomes safe. 0: it stays active for three seconds.
+  // Milliseconds until the board becomes safe. 0: the board stays active for three seconds.
   std::uint32_t safe_after() {
     const std::uint32_t from_ms = board.now_ms;
     board.run(3000);
@@ -129,7 +129,7 @@ struct ApplicationStandstill : testing::Test {
 };
 
 TEST_F(ApplicationStandstill, AWaitingHeartbeatCountsFromTheStartOfTheStandstill) {
-  board.now_ms += 300;  // the loop did not run, and the heartbeat came at the beginning
+  board.now_ms += 300;  // the heartbeat arrived when the standstill began
   host.heartbeat(6);
   EXPECT_FALSE(board.safe());
   EXPECT_EQ(safe_after(), 1000U - 300U);
@@ -241,7 +241,7 @@ TEST_F(ApplicationStandstill, ACommandOvertakenByAWaitingHeartbeatIsStale) {
   const std::uint32_t overtaken = host.pnum++;
   board.now_ms += 300;
   host.heartbeat(6);
-  host.resend("O:100,1,1", overtaken);  // perhaps sent 300 ms after the heartbeat
+  host.resend("O:100,1,1", overtaken);  // the command may be 300 ms younger than the heartbeat
   EXPECT_EQ(board.log.refused, (Lines{std::to_string(overtaken) + " STALE"}));
 }
 
@@ -493,8 +493,7 @@ TEST(ApplicationLink, TheFirstNumberOfASessionIsOneOnEveryPort) {
   EXPECT_EQ(board.take(MessageKind::state, 1)[0].pnum, 1U);
 }
 
-// The paper's Python client puts T before PNum, counts its clock in seconds, and answers each
-// heartbeat.
+// The paper's Python client puts T before PNum, has a clock in seconds, and answers each heartbeat.
 TEST(ApplicationLink, ServesThePapersPythonClient) {
   TestBoard board;
   std::uint32_t pnum = 0;

@@ -213,7 +213,7 @@ TEST_F(ApplicationSafety, ADelayedClearDoesNotClearANewerStop) {
   std::uint32_t number = host.command(asked);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_EQ(board.log.refused, Lines{std::to_string(number) + " STALE"});
-  host.echo();  // also if the host has the second cause and clears the first cause
+  host.echo();  // the host may have the second cause and clear the first
   board.run(2000);
   host.connect();
   number = host.command(asked);

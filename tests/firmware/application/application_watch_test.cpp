@@ -39,7 +39,7 @@ struct TestWatcher {
     board.receive(
         "W:" + lease + ";PNum:" + std::to_string(pnum++) + ";T:" + std::to_string(echo) + ";", at);
   }
-  // Requests a lease, takes the answer and echoes it.
+  // Requests a lease, receives the answer and echoes it.
   void watch(const std::string& lease) {
     take();
     ask(lease, 0);

@@ -8,7 +8,7 @@
 namespace r4::firmware {
 namespace {
 
-// A shaft with 4 counts a cycle. A leads B when it turns forward.
+// A shaft with 4 counts a cycle. If the shaft turns forward, A leads B.
 struct Shaft {
   void turn(int counts) {
     const int step = counts > 0 ? 1 : -1;

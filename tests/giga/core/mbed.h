@@ -62,8 +62,8 @@ namespace mbed {
 
 template <class Signature>
 class Callback;
-// A function, or a method or function with its object, stored inside as in the original. Its copy
-// and its destruction are not trivial (MBED_CONF_PLATFORM_CALLBACK_NONTRIVIAL is 1 on the Giga).
+// A function, or a method or function with its object, stored inside as in the original. A Callback
+// is not trivial to copy or destroy (MBED_CONF_PLATFORM_CALLBACK_NONTRIVIAL is 1 on the Giga).
 template <>
 class Callback<void()> {
  public:

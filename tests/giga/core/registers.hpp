@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The STM32H747's registers that the firmware uses, by their CMSIS names. In the compiler check
-// they are plain words. In the tests they are objects with behaviour.
+// The STM32H747's registers that the firmware uses, by their CMSIS names. In the compiler check the
+// registers are plain words. In the tests the registers are objects with behaviour.
 #pragma once
 
 #include <cstdint>

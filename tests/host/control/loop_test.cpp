@@ -207,7 +207,7 @@ TEST_F(RunLoopWithoutArming, DrivesAndStopsTheMotors) {
   const auto drive_four_times = [&](const LoopStep& step) {
     return ++steps < 5 ? drive(step) : std::nullopt;
   };
-  // The loop requires an armed board: it does not run, and leaves no output driven.
+  // The loop requires an armed board. Otherwise the loop ends and leaves no output driven.
   const LoopReport untold = run_loop(board, loop, drive_four_times);
   EXPECT_EQ(untold.end, LoopEnd::disarmed);
   EXPECT_TRUE(contains(untold.why, "not yet; call arm() first")) << untold.why;

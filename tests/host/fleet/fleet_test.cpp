@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Fleet with simulated boards, in its own process and over UDP.
+// r4::Fleet with simulated boards, in the process of the fleet and over UDP.
 #include "r4link/fleet.hpp"
 
 #include <gtest/gtest.h>

@@ -132,7 +132,7 @@ TEST_F(RecordingOfABoard, AllocatesNothingPerDatagramAndCountsDropped) {
   const std::uint16_t path = recorder.add_path("sim:");
   const std::string datagram(1000, 'x');
   const std::uint64_t before = bench::allocations_of_this_thread();
-  // Faster than a disk can write.
+  // The test records faster than a disk can write.
   for (int i = 0; i < 50'000; ++i) recorder.record(path, RecordKind::from_board, datagram);
   EXPECT_EQ(bench::allocations_of_this_thread(), before);
   recorder.close();

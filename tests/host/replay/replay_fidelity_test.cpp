@@ -41,7 +41,7 @@ struct ToldOfABoard {
                         std::to_string(result.position) + ": " + std::string(bytes));
     });
     board.on_event([this](const CarrierEvent& event) {
-      if (event.kind == CarrierEvent::Kind::warning) return;  // about this program
+      if (event.kind == CarrierEvent::Kind::warning) return;  // a warning is about this program
       events.push_back(to_text(event.kind) + (" " + event.problem.reason));
     });
     board.on_link([this](const LinkStatus& link) {

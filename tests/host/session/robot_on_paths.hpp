@@ -44,17 +44,17 @@ class RobotOnPaths final : private DrivenSession::Handler {
   void connect();
   void run(std::uint32_t ms);
   // The host sleeps: its clock stops, and datagrams that arrive meanwhile are lost. After waking,
-  // its boot clock includes the sleep.
+  // the host's boot clock includes the sleep.
   void sleep(std::uint32_t ms);
   // Like sleep(), but as in a paused virtual machine: no clock includes the pause.
   void pause(std::uint32_t ms);
-  // Without notice, like a cable that is cut somewhere in a network.
+  // Cuts the path without notice, like a cable that is cut somewhere in a network.
   void cut(std::size_t path, bool is_cut = true);
-  // With notice by the transport.
+  // Connects or disconnects the path. The transport reports the change.
   void plug(std::size_t path, bool in);
   // The board restarts, and its clock begins at `t_ms`.
   void reboot(std::size_t board, std::uint32_t t_ms = 50);
-  // Delivers a datagram to the host as if it came over that path.
+  // Delivers a datagram to the host as if the datagram arrived over that path.
   void bring(std::size_t path, std::string_view bytes);
   CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);
   CommandResult drive(int pwm) {

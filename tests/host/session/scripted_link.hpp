@@ -14,7 +14,7 @@
 
 namespace r4::test {
 
-// For tests that need any command.
+// A command for tests that need any command.
 inline const Command turn_motor = Command::osmc(1, Pwm(358), Direction::forward);
 
 class ScriptedLink : private DrivenSession::Handler {
@@ -58,8 +58,8 @@ class ScriptedLink : private DrivenSession::Handler {
   // Advances the time, and calls poll() exactly when it is due.
   void pass(Time duration);
 
-  // Sends a datagram of the board. Its clock runs with the host's clock, and its packet numbers
-  // count up.
+  // Sends a datagram of the board. The board's clock runs with the host's clock, and the board's
+  // packet numbers count up.
   void boot_heartbeat();  // H:R4-ROS2;PNum:0;T:0;
   void heartbeat(SafeReason reason = SafeReason::none);
   void stopped(std::uint32_t stop, int cause = 1);  // SAFE:2 after the E:STOP with this number

@@ -212,7 +212,7 @@ TEST_F(SessionArming, AnOvertakenStateDoesNotProveThatRelay1IsOpen) {
   armed();
   link.pass(20ms);
   const std::uint32_t number =
-      link.board_pnum++;  // sent before the heartbeat, while relay 1 was open
+      link.board_pnum++;  // the state is older than the heartbeat, and has relay 1 open
   const std::uint32_t t_ms = link.board_ms();
   link.pass(5ms);
   link.heartbeat();
@@ -227,7 +227,7 @@ struct EarlierCause : NewSession {
   EarlierCause() : NewSession(ScriptedLink::must_arm()) {}
   // A program starts while its board is safe for this reason. The board obeys the program.
   void begin(SafeReason reason) {
-    link.heartbeat();  // sent before the cause and delayed by the network, so it proves nothing
+    link.heartbeat();  // this delayed heartbeat is older than the cause, so it proves nothing
     link.heartbeat(reason);
     link.pass(10ms);
     says(reason);
@@ -311,7 +311,7 @@ TEST_F(EarlierCause, StaysEarlierIfTheStopIsPressedAgain) {
 
 TEST_F(EarlierCause, MayBeHiddenByALaterStop) {
   begin(SafeReason::fault);
-  says(SafeReason::stop);  // a stop that came after the start
+  says(SafeReason::stop);  // a stop after the start
   const Ticket ticket = link.session.arm(1s, link.now);
   link.pass(1ms);
   ASSERT_EQ(link.count('E'), 1U) << "the stop came while the program was running";

@@ -105,7 +105,7 @@ TEST_F(SessionCommand, IsRepeatedAtOnceIfOvertakenAndEndsByTheAnswer) {
     const Ticket first = link.session.send(turn_motor, 1s, link.now);
     link.session.send(Command::servo(2, Microseconds(1500)), 1s, link.now);
     link.pass(10ms);
-    link.executed(link.last('S').pnum);  // the state between them was lost
+    link.executed(link.last('S').pnum);  // the state that confirms `first` was lost
     EXPECT_TRUE(under_way(first)) << "a CMD with a later number proves nothing";
     EXPECT_EQ(link.count('O'), 2U) << "the command must be repeated at once, not after 50 ms";
     link.nack(link.last('O').pnum, answer);
@@ -280,7 +280,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
   EXPECT_EQ(link.session.statistics(link.now).timed_out, 0U) << "a command must end only once";
   EXPECT_EQ(link.last('E').bytes, link.all('E').front().bytes);
 
-  link.executed(link.last('E').pnum);  // in control again after a second of silence
+  link.executed(link.last('E').pnum);  // the host is in control again after a second of silence
   for (const bool posts : {false, true}) {
     link.session.send(Command::stop(), 1s, link.now);
     link.stopped(link.last('E').pnum);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Groups of commands: one datagram if the board executes groups, otherwise one command after
-// another.
+// Groups of commands. If the board executes groups, a group is one datagram. Otherwise a group is
+// one command after another.
 #include <gtest/gtest.h>
 
 #include "r4link/commands/command_text.hpp"

@@ -230,7 +230,7 @@ TEST_F(SessionKey, AStoppedBoardThatAnswersBusyHasAnotherHost) {
 }
 
 // At the lowest rate the host sends several heartbeats between two states. None of these heartbeats
-// may count as refused.
+// may be treated as refused.
 TEST_F(SessionWithKey, AStateASecondShowsThatAStoppedBoardAcceptsTheKey) {
   for (int i = 0; i < 10; ++i) {
     link.state("SAFE:2;CMD:0;");
@@ -247,7 +247,7 @@ TEST_F(SessionWithKey, AStateASecondShowsThatAStoppedBoardAcceptsTheKey) {
   EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
 }
 
-// The paper's release answers no question, but it obeys commands. It has no keys.
+// The paper's release has no keys and answers no question, but obeys commands.
 TEST_F(SessionKey, ABoardWithAKeyIsNotMistakenForThePaperRelease) {
   for (int i = 0; i < 30; ++i) {
     keyed_heartbeat(link);

@@ -21,7 +21,7 @@ bool executed_once(const RobotOnPaths& robot) {
                      [](const auto& each) { return each.second == 1; });
 }
 
-// The board's answer to the newest heartbeat if another host is in control.
+// While another host is in control: the board's answer to the newest heartbeat.
 std::string busy_for(const RobotOnPaths& robot) {
   Datagram datagram;
   EXPECT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));

@@ -18,14 +18,14 @@ class SleepingHost : public ::testing::TestWithParam<Cables> {
   void cut_all(RobotOnPaths& of, bool is_cut = true) {
     for (std::size_t path = 0; path < of.cables.size(); ++path) of.cut(path, is_cut);
   }
-  // All are longer than the board waits for its host. Some are shorter and some longer than the
-  // tolerance of the board's clock.
+  // All sleeps are longer than the time that the board waits for its host. Some sleeps are shorter
+  // than the tolerance of the board's clock, and some sleeps are longer.
   static constexpr std::uint32_t naps_ms[] = {1500, 9000, 60'000};
 
   RobotOnPaths robot{GetParam()};
 };
 
-// With the setting recovery=last, the board restores its outputs if a session continues.
+// If a session continues with recovery=last, the board restores its outputs.
 TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
   for (const std::uint32_t nap_ms : naps_ms) {
     RobotOnPaths sleeper(GetParam());
@@ -100,7 +100,7 @@ TEST_P(SleepingHost, SwitchesTheMotorsOffBeforeALongBoardTimeout) {
   EXPECT_TRUE(patient.session->in_control(patient.now()));
 }
 
-// The command was being sent when the host went to sleep. It may arrive late or never.
+// The command was being sent when the host went to sleep, so it may arrive late or never.
 TEST_P(SleepingHost, RepeatsNoEarlierCommand) {
   for (const std::uint32_t later_ms : {0U, 10U, 60U}) {
     RobotOnPaths sender(GetParam());

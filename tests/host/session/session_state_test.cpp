@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state that a session keeps of its board, the age of that state, and how a restart of the
+// The state that a session stores of its board, the age of that state, and how a restart of the
 // board clears it.
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The link: how it comes up, stays alive and ends, and how the session reports this.
+// The link: how it comes up, stays alive and ends, and how the session reports these changes.
 #include "host/session/session.hpp"
 
 #include <gtest/gtest.h>

@@ -13,7 +13,7 @@ namespace {
 
 using Cables = RobotOnPaths::Cables;
 
-// Two paths, of which the second or both are buses.
+// Two paths. The second path or both paths are buses.
 class WatchedBus : public testing::Test {
  protected:
   explicit WatchedBus(std::size_t board_of_bus = 0, bool first_is_asked = true) {

@@ -69,7 +69,7 @@ TEST(UartStream, KeepsTheNewestBytesAndCountsOlderBytesAsLost) {
   EXPECT_EQ(data.bytes.size() + data.lost, 2000U * 64);
 }
 
-// Includes the board's side of the stream.
+// The test includes the board's side of the stream.
 TEST(UartStream, DeliversOrCountsEachByteWhenStatesAreLost) {
   struct Line final : firmware::UserUartPort {
     void set_up(const UartMode&) override {}

@@ -54,7 +54,7 @@ TEST(DatagramWriter, ConstantFieldNamesAreWrittenTheSame) {
                 !FieldName("A:").allowed() && !FieldName("\x7F").allowed() &&
                 !FieldName("").allowed());
   EXPECT_EQ(str(twelve.name()), "TWELVELETTER");
-  // In a buffer of every size, also where the copy of fixed size does not fit.
+  // The buffers have every size, including sizes that are too small for the copy of fixed size.
   for (std::size_t capacity = 0; capacity <= 64; ++capacity) {
     const auto write = [&](const auto& first, const auto& second) {
       std::string buffer(capacity + 32, '#');

@@ -80,7 +80,7 @@ struct BoardLinkTest : testing::Test {
     return std::string(name_of(code).data(), name_of(code).size());
   }
 
-  // Connects a host with a SID. Its first heartbeat has no echo and the number first_number. Its
+  // Connects a host with a SID. The first heartbeat has no echo and the number first_number. The
   // second heartbeat has the next number.
   void connect() {
     send_due();

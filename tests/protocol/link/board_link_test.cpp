@@ -518,7 +518,7 @@ TEST_F(BoardLinkTest, ReportsExactlyWhenItIsDue) {
   EXPECT_EQ(link.due_in(now), 1U);
   now += 1;
   EXPECT_TRUE(link.poll(now));
-  EXPECT_EQ(link.due_in(now), 0U);  // for the heartbeat of LOST
+  EXPECT_EQ(link.due_in(now), 0U);  // the heartbeat of LOST is due
   send_due();
   EXPECT_EQ(link.due_in(now), 500U);
 }

@@ -17,7 +17,7 @@ struct HostLinkTest : testing::Test {
     link.on_reason(reason, now);
   }
   void booting(SafeReason reason = SafeReason::none) { link.on_booting(reason, now); }
-  // Sends a heartbeat if it is due. True if a heartbeat was sent.
+  // If a heartbeat is due, sends the heartbeat and returns true.
   bool send_due() {
     if (!link.heartbeat_due(now)) return false;
     link.heartbeat_sent(now);

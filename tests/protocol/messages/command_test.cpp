@@ -40,8 +40,8 @@ std::string written(const Command& command) {
   return writer.ok() ? std::string(buffer, writer.size()) : "refused";
 }
 
-// Reads the command in `text` and writes it again. Returns the name of the refusal if it is
-// refused.
+// Reads the command in `text` and writes it again. If the command is refused, returns the name of
+// the refusal.
 std::string again(const std::string& text) {
   Field field;
   EXPECT_TRUE(read_field(text, field)) << text;
@@ -108,7 +108,7 @@ TEST(Command, EachFactoryMakesItsCommandText) {
   EXPECT_EQ(written(Command::ask_wiring()), "Q:WIRING");
 }
 
-// A command whose first value has a range. Its text consists of this value and the channel.
+// A command whose first value has a range, and whose text consists of this value and the channel.
 struct Ranged {
   const char* letter;
   const char* middle;  // the text between value and channel

@@ -15,8 +15,8 @@ namespace {
 
 using test::str;
 
-// Reads the command in `text` and writes it again. Returns the name of the refusal if it is
-// refused.
+// Reads the command in `text` and writes it again. If the command is refused, returns the name of
+// the refusal.
 std::string device_again(const std::string& text) {
   Field field;
   EXPECT_TRUE(read_field(Text(text), field)) << text;

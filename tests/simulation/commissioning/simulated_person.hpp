@@ -24,7 +24,7 @@ class SimulatedPerson final : public commissioning::Person {
   commissioning::Answer await_key(const commissioning::Movement& movement) override;
   bool holds_key() override;
 
-  // If it returns an answer, the answer replaces the usual answer.
+  // If this function returns an answer, the answer replaces the usual answer.
   std::function<std::optional<commissioning::Answer>(const commissioning::Question&)> otherwise;
   std::optional<std::uint32_t> lets_go_after_ms;  // after the start of the next movement
   std::function<void()> before_key;  // called once, while the person reads about the next movement

@@ -14,7 +14,7 @@ struct Description {
   const char* text;
 };
 
-// In the order of Fault::Kind.
+// The descriptions are in the order of Fault::Kind.
 constexpr Description descriptions[] = {
     {"lost", "is lost"},
     {"twice", "arrives twice"},

@@ -5,7 +5,7 @@
 // which they are sent. A fault happens to a datagram, or to a path, a host or the board after the
 // datagram is sent and before it arrives.
 //
-// It checks the promises of the world (world.hpp). From the board's behaviour alone it also checks:
+// A run checks the promises of world.hpp, and by the board's behaviour alone these promises:
 //    silence   outputs of a host are live only while intact heartbeats of the same process arrive.
 //    joined    only the heartbeats of its own host keep a session.
 //    resumed   only its own host resumes a session.
@@ -15,8 +15,8 @@
 //    served    while a host is in control, strangers do not prevent confirmations of its commands.
 //    returns   at the end of a run without strangers, a host that runs is in control.
 //
-// With a key, the first arrival of a signed datagram at the board counts as its host's, whatever
-// its peer is (docs/design/safety-argument.md). Later arrivals count as the stranger's.
+// With a key, the first arrival of a signed datagram at the board belongs to its host, whatever its
+// peer is (docs/design/safety-argument.md). Later arrivals belong to the stranger.
 #pragma once
 
 #include <cstdint>

@@ -15,7 +15,7 @@
 namespace r4::simulation {
 namespace {
 
-// The faults that may come next in this run.
+// The faults that may follow in this run.
 std::vector<Fault> next_faults(const Play& play, const std::vector<Fault>& faults) {
   std::vector<Fault> next;
   Fault first{0, Fault::Kind::lost};

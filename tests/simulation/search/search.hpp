@@ -34,8 +34,8 @@ Search search(const Story& story, int most_faults);
 // that repeats the schedule.
 std::string tell(const Story& story, const Finding& finding);
 // The broken promise and the kinds of faults that break it, for example "joined: stranger-joins".
-// If strangers take part, only their faults are listed. Also holds the number of such schedules and
-// the first schedule. A kind is omitted if fewer faults of the same kinds break the same promise.
+// If strangers take part, only their faults are listed. If fewer faults of the same kinds break the
+// same promise, the kind is omitted. Holds the number of schedules and the first schedule.
 struct FoundKind {
   std::size_t schedules = 0;
   Finding first;

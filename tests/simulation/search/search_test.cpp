@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The promises of docs/design/safety-argument.md with every combination of few faults in short
-// stories. R4_FAULTS sets the highest number of faults at once. Its default is 2 if R4_SCHEDULES
-// (30,000 by default) is at least 100,000, or at least 10,000 for a story with few schedules.
-// Otherwise its default is 1. R4_STORY and R4_STORY_FAULTS repeat one schedule and print its trace.
+// stories. R4_FAULTS sets the highest number of faults at once. If R4_SCHEDULES (30,000 by default)
+// is at least 100,000, or at least 10,000 for a story with few schedules, the default is 2.
+// Otherwise the default is 1. R4_STORY and R4_STORY_FAULTS repeat one schedule and print its trace.
 #include "search.hpp"
 
 #include <fmt/format.h>

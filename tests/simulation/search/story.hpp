@@ -33,7 +33,7 @@ struct Story {
   const char* name;
   const char* text;  // what happens, in plain words
   std::vector<Act> acts;
-  // Later datagrams have no faults. In the time after this, a board and hosts recover from two
+  // After this time no datagram has a fault. Board and hosts then have time to recover from two
   // faults.
   std::uint32_t faults_until_ms = 0;
   static constexpr std::uint32_t recovery_ms = 3000;

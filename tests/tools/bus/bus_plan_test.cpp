@@ -101,7 +101,7 @@ TEST(BusPlan, ABusThatCannotCarryTheHeartbeatsHasRoomForNoBoard) {
   EXPECT_EQ(highest_rate(plan, 0.8), 0U);
 }
 
-// Longer than one datagram can be, so the board sends it in parts.
+// The state is longer than a datagram can be, so the board sends the state in parts.
 TEST(BusPlan, SplitsAllFieldsLikeTheBoard) {
   BusPlan plan = plan_for(1, false);
   plan.fields = FieldSet::all();

@@ -45,7 +45,7 @@ class MadeUpMachine {
   std::map<std::string, std::string> says;  // the output of each command
 };
 
-// The finding of this check. Empty if there is none.
+// The finding of this check. Empty if there is no finding.
 inline Finding found_by(const Findings& findings, const std::string& check) {
   for (const Finding& each : findings) {
     if (each.check == check) return each;

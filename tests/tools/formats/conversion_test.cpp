@@ -18,7 +18,7 @@ TEST(Conversion, PreservesANativeRecording) {
   }
 }
 
-// For a recording of any program, including a recording without a line that names its program.
+// The recording is from any program, and may have no line that names the program.
 TEST(Conversion, CopiesNoSecretIntoAnotherFile) {
   std::string native;
   write_record_header(native);

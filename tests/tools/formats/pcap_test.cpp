@@ -288,7 +288,7 @@ std::vector<std::string> blocks_of(const std::string& file) {
 }
 
 // The packets of two captures in turn, in the order in which mergecap writes packets with equal
-// times. Each capture has its own interfaces, or both share the interfaces of the first capture.
+// times. Each capture has its own interfaces, or both captures share the interfaces of the first.
 std::string merged_by_mergecap(const std::string& a, const std::string& b, bool own) {
   std::string head = blocks_of(a)[0], packets;
   std::vector<std::string> left, right;

@@ -109,7 +109,7 @@ TEST(Ros2Drivers, IgnoreAStepperPositionFromBeforeItWasZeroed) {
   driven.drivers.on_publishers(&driven.topic, {});
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.now += 20ms;
-  driven.told(2, 50020);  // sent before the board executed the zero command
+  driven.told(2, 50020);  // this state is older than the zero command
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.now += 80ms;
   driven.told(2, 3);

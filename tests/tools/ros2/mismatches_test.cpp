@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Faults of other programs' readers and writers, found in their announcements. Also a graph of many
+// Faults of other programs' readers and writers, found in their announcements, and a graph of many
 // nodes.
 #include "tools/r4/ros2/discovery/mismatches.hpp"
 

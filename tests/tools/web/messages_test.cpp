@@ -11,7 +11,7 @@
 namespace r4::tool::web {
 namespace {
 
-// The values of a JSON row by the names of their columns; the key of the time is "time".
+// The values of a JSON row by the names of their columns. The key of the time is "time".
 Json row_of(const Columns& columns, const Json& row) {
   Json values;
   values["time"] = row.at(0);

@@ -167,8 +167,8 @@ TEST(CanBusModel, AFrameEndsARunOfRecessiveBits) {
   bench.bus.send(node, frame(0x100));
   bench.bus.corrupt_next(32);
   const std::uint64_t until_off = (32 * (bits(frame(0x100)) + 7) + 16 * 8) * bit_ns;
-  // The other frame begins ten bits after the bus is free, so a run of 21 bits counts once. The end
-  // of the other frame begins another run.
+  // The other frame begins ten bits after the bus is free, so a run of 21 bits is counted once. The
+  // end of the other frame begins another run.
   bench.bus.at(until_off + 10 * bit_ns, [&] { bench.bus.send(other, frame(0x200)); });
   bench.bus.run_until(second_ns);
   ASSERT_EQ(bench.heard.size(), 2U);

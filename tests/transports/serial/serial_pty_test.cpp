@@ -284,7 +284,7 @@ TEST_F(SerialPtyTest, GivesAStalledReaderARecentStateFirst) {
   open_board();
   const FileDescriptor reader = open_raw(board->name().substr(4));
   ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
-  // Ages count in states, not in time, because a machine with a standstill sends no states.
+  // An age is a number of states, not a time, because a machine with a standstill sends no states.
   constexpr int period_ms = 10;
   std::size_t sent = 0;
   std::size_t oldest = 0;

@@ -142,7 +142,7 @@ class SharedTransportTest : public testing::Test {
         role);
     return made;
   }
-  // A program whose open() has returned. Its loop need not run.
+  // A program whose open() has returned, and whose loop need not run.
   std::unique_ptr<Program> opened_in(asio::io_context& loop, BoardRole role) {
     auto made = program(role, loop);
     made->open();
@@ -172,8 +172,8 @@ class SharedTransportTest : public testing::Test {
       return (programs->has(text) && ...);
     });
   }
-  // A socket of another user's program, which only root can make. With `has_name` it has the name
-  // of the holder with the given role. Otherwise it is connected to this holder.
+  // A socket of another user's program, which only root can make. With `has_name` the socket has
+  // the name of the holder with the given role. Otherwise the socket is connected to this holder.
   FileDescriptor foreign_socket(BoardRole role, bool has_name) const {
     const std::string name =
         (role == BoardRole::control ? "r4link/0/control/" : "r4link/0/") + share.text;

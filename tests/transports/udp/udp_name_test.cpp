@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board with a host name: how a UDP carrier looks up its address, and repeats the lookup.
+// A board with a host name: how a UDP carrier looks up the address, and repeats the lookup.
 #include <gtest/gtest.h>
 
 #include <asio/post.hpp>
@@ -19,7 +19,7 @@ using std::chrono::milliseconds;
 // A name server for the test. The thread of a lookup may outlive the test.
 class Names {
  public:
-  // Sets the address of the host; "" if it has none.
+  // Sets the address of the host; "": no address.
   void set(const std::string& address) {
     const std::lock_guard lock(shared_->mutex);
     shared_->found = FoundHost();
@@ -182,7 +182,7 @@ TEST_F(UdpNameTest, IsNotLookedUpAgainWhileTheBoardIsHeard) {
   host->open(at_host);
   host->send(valid_answer("hello"), Priority::normal);
   ASSERT_TRUE(run_until(io, [&] { return at_board.has(valid_answer("hello")); }));
-  // Only valid datagrams count.
+  // Only valid datagrams postpone the next lookup.
   const auto speak = [&](const std::string& text, int times) {
     for (int i = 0; i < times; ++i) {
       board->send(text, Priority::normal);

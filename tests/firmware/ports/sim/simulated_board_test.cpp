@@ -479,7 +479,7 @@ TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndIsReportedBack) {
       [this] {
         newest_t();
         listener_.heard.clear();
-        for (;;) {  // a state with all fields comes in parts
+        for (;;) {  // a state with all fields is sent in parts
           heartbeat(newest_t());
           run(10);
           State whole;

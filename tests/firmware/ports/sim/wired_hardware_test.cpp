@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The firmware's hardware on boards with any wiring that the firmware knows, and on boards whose
+// The firmware's hardware on boards with any wiring that the firmware supports, and on boards whose
 // wiring differs from the firmware's.
 #include <gtest/gtest.h>
 

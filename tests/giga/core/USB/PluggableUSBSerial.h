@@ -20,8 +20,8 @@ class PluggableUSBDevice : public USBDevice {
 
 class USBCDC {
  public:
-  // Gives the driver the bytes that it can accept. It accepts none while a packet is being sent or
-  // the port is closed.
+  // Gives the driver the bytes that it can accept. While a packet is being sent or the port is
+  // closed, the driver accepts no bytes.
   void send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t* actual, bool now = true);
 
  protected:
@@ -37,7 +37,7 @@ class USBSerial : public USBCDC {
   int read();
   void attach(
       void (*function)());  // called in the USB interrupt when a packet has arrived; at most four
-  std::uint32_t baud();  // the newest baud rate that the host has set; 0: none yet
+  std::uint32_t baud();     // the newest baud rate that the host has set; 0: none yet
 };
 
 }  // namespace arduino

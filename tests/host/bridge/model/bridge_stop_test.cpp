@@ -3,8 +3,8 @@
 // states as fast as the bus carries them, and the bridge passes on each state. Meanwhile a host
 // sends commands.
 //
-// The bridge, its carriers, UDP and the loop are real. The bus is exact to the bit. Its clock stops
-// while the bridge works.
+// The bridge, its carriers, UDP and the loop are real. The bus is exact to the bit. The clock of
+// the bus stops while the bridge works.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -57,7 +57,7 @@ class TalkingBoard {
       node_.begin(Text(state()), bus_.now_us());
       ++said;
     }
-    // The frames of a transfer come one after another.
+    // The frames of a transfer follow each other.
     CanFrame frame{};
     while (bus_.waiting(controller_) < 1 && node_.offer(bus_.now_us(), frame)) {
       bus_.send(controller_, frame);
@@ -164,8 +164,8 @@ void expect_stops(const ControllerOptions& options, std::uint64_t frames_between
   for (std::uint64_t i = 0; i < stops; ++i) {
     world.say("H:ROS2-R4");
     world.say("S:1500,1");
-    // Half of the stops come at any time, the other half while more frames wait than the controller
-    // accepts.
+    // Half of the stops are sent at any time. The other half are sent while more frames wait than
+    // the controller accepts.
     const bool at_any_time = i % 2 == 0;
     for (int frames = 0; frames < 100 && !at_any_time; ++frames) {
       if (world.controller.waiting() >= options.room) break;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CanSocket on a bus that is exact to the bit. In this program it replaces the kernel's socket
-// (transports/can/can_socket.cpp).
+// CanSocket on a bus that is exact to the bit. In this program this CanSocket replaces the kernel's
+// socket (transports/can/can_socket.cpp).
 //
 //     a socket for urgent frames, a socket for the other frames --> the controller --> the bus
 //

@@ -13,8 +13,8 @@
 namespace r4::test {
 namespace {
 
-// In the packed form. tests/host/board_test.cpp tests every channel in plain text over UDP and a
-// pty.
+// The datagrams are packed. tests/host/board_test.cpp tests every channel in plain text over UDP
+// and a pty.
 TEST(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated("can://vcan0?node=9");
   Board board(simulated.url(), at_will());

@@ -51,7 +51,7 @@ class Talker final : public CanBus::Member {
   std::shared_ptr<CanBus> bus_;
 };
 
-// `rate`: bits a second; a frame counts as 128 bits.
+// `rate`: bits a second. A frame is treated as 128 bits.
 class SlowBus {
  public:
   explicit SlowBus(int rate) {

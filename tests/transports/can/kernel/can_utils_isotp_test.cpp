@@ -56,7 +56,7 @@ std::string link_options(const Form& form) {
          " " + can_interface;
 }
 
-// With padding. kernel_isotp_test.cpp also tests the forms without padding.
+// The frames are padded. kernel_isotp_test.cpp also tests the forms without padding.
 class CanUtils : public testing::TestWithParam<Form> {};
 INSTANTIATE_TEST_SUITE_P(, CanUtils, testing::Values(forms[1], forms[3]),
                          [](const auto& form) { return form.param.name; });

@@ -21,7 +21,7 @@ constexpr std::uint32_t flow_control_id = 0x200;
 // The emulated machine is slow and shares its processors, so limits that are not under test are
 // long.
 constexpr std::uint32_t patience_us = 2000000;
-// From the call to the first frame, which may come from another program.
+// The time from the call to the first frame, which another program may send.
 constexpr std::uint32_t start_limit_us = 10000000;
 
 // The lengths to test: each length at which single frames end or sequence numbers restart. Also

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CAN_RAW socket for tests. It receives one id, and every wait has a limit. If the kernel refuses
-// a call, the class throws the reason, so the test fails with the reason.
+// A CAN_RAW socket for tests. The socket receives one id, and every wait has a limit. If the kernel
+// refuses a call, the class throws the reason, so the test fails with the reason.
 #pragma once
 
 #include <linux/can.h>

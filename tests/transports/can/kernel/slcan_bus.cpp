@@ -3,7 +3,7 @@
 //
 //     slcan_bus [--nodes 2] [--bitrate 125000]
 //
-// It opens a pty for each node and prints one line:
+// slcan_bus opens a pty for each node and prints one line:
 // {"type":"ready","bitrate":125000,"ptys":["/dev/pts/3",…]}. Each pty uses the slcan protocol, as
 // the adapters of line discipline 17 of Linux do:
 //
@@ -14,19 +14,19 @@
 // ends. The kernel sends C, S and O when an interface of known bit rate comes up. The process
 // refuses a wrong bit rate, and then the node stays off the bus. O resets the controller: no
 // errors, an empty queue, and a return from bus-off after 128 times 11 recessive bits. The
-// controller has three mailboxes, lowest id first. While they are full, the pty is not read, and
-// frames wait in the kernel.
+// controller has three mailboxes, lowest id first. While the mailboxes are full, the pty is not
+// read, and frames wait in the kernel.
 //
 // The bus (support/can_bus_model.hpp) follows the clock. If the process is delayed, it catches up:
 // frames on the bus keep their correct times, whenever the process computes them.
 //
-// The process reports to the kernel what a hardware controller reports to its driver. It sends
-// s[awpb]RRRTTT when the state of a node changes (active, warning from 96 errors, passive, bus-off;
-// the counters). It sends e3aaa when a frame was not acknowledged, and e3ccc when a frame was
-// damaged, each at most every 10 ms. They have three letters because slcan ignores lines of less
-// than five characters. The kernel turns these lines into error frames. Linux 6.1 switches the
-// carrier off at bus-off. slcan switches the carrier on again only after `ip link set slcan0 down`
-// and `up` (no restart-ms, no CAN_ERR_RESTARTED).
+// The process reports to the kernel what a hardware controller reports to its driver. The line
+// s[awpb]RRRTTT follows a change of a node's state (active, warning from 96 errors, passive,
+// bus-off; the counters). The line e3aaa follows a frame that was not acknowledged, and e3ccc
+// follows a damaged frame, each at most every 10 ms. These lines have three letters because slcan
+// ignores lines of less than five characters. The kernel turns these lines into error frames. Linux
+// 6.1 switches the carrier off at bus-off. slcan switches the carrier on again only after `ip link
+// set slcan0 down` and `up` (no restart-ms, no CAN_ERR_RESTARTED).
 //
 // Orders, one line each on stdin. The answer to each order is one line, {"type":"done"} or
 // {"type":"error","reason":…}. The process ends at the end of stdin.

@@ -96,7 +96,7 @@ CanFrame any_frame() {
   frame.remote = !frame.fd && *rc::gen::inRange(0, 8) == 0;
   frame.id = *rc::gen::arbitrary<std::uint32_t>() & (frame.extended ? 0x1FFFFFFFU : max_can_id);
   frame.size = can_frame_size(static_cast<std::uint32_t>(*rc::gen::inRange(0, frame.fd ? 65 : 9)));
-  // Includes long runs of equal bits, which need stuff bits.
+  // The bytes include long runs of equal bits, which need stuff bits.
   const std::vector<std::uint8_t> bytes = *rc::gen::elementOf(
       std::vector<std::vector<std::uint8_t>>{{0x00}, {0xFF}, {0x0F}, {0x3C, 0x1E}, {}});
   for (std::size_t i = 0; i < frame.size; ++i) {
@@ -129,7 +129,7 @@ TEST(CanBits, MatchFramesCountedByHand) {
   frame.fd = true;
   const CanBits bits = can_bits(frame);
   EXPECT_EQ(bits.nominal, 14U + 2U + 3U + 12U);
-  // ESI and length code are five zeros after a BRS of 1. The fixed stuff bit follows them anyway.
+  // ESI and length code are five zeros after a BRS of 1. The fixed stuff bit follows anyway.
   EXPECT_EQ(bits.data, 5U + 27U + 1U);
 }
 

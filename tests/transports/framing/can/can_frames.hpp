@@ -12,7 +12,7 @@
 
 namespace r4::test {
 
-// A classic frame, or an FD frame if it has more than 8 bytes.
+// A classic frame. If there are more than 8 bytes: an FD frame.
 inline CanFrame frame_of(std::uint32_t id, const std::string& hex) {
   CanFrame frame{};
   frame.id = id;

@@ -48,7 +48,7 @@ struct NodeBus {
   std::uint32_t now_us = 0xFFFFFF00;  // wraps during the test
   std::vector<std::string> at_board, at_host;
   std::vector<std::uint32_t> ids;
-  std::size_t lose = 0;  // number of the lost frame, from 1; 0: none
+  std::size_t lose = 0;  // number of the lost frame, from 1; 0: no frame is lost
 };
 
 const std::string state_line = with_crc("AIN24:23.5;AIN12:12.1;OSMC1:358,1;PNum:77;T:81234;");
@@ -160,7 +160,7 @@ TEST(CanNode, AHostMayPackForABoardThatSendsText) {
   EXPECT_EQ(bus.board.counters().unpacked, 1U);
 }
 
-// An emergency frame has no form and may come from any host.
+// An emergency frame has no form, and any host may send the frame.
 TEST(CanNode, AnEmergencyFrameDoesNotChangeTheForm) {
   NodeBus bus;
   bus.board.use_packed_form(true);

@@ -24,7 +24,7 @@ constexpr std::uint32_t period_us = 10000;  // from one datagram to the next
 struct Stream {
   const char* what;
   std::uint32_t shortest, longest;
-  std::uint32_t other_every, other;  // 0: none
+  std::uint32_t other_every, other;  // 0: no other length
   int datagrams;
 };
 
@@ -115,9 +115,9 @@ class LossyLine {
 };
 
 // A wrong sequence number within a datagram is always noticed. If frames over a border are lost,
-// the numbers may fit again. The run of lost frames then has the number of frames of a datagram,
-// less 16 (32 …) if the datagram has more. 18 frames are the worst case, because two lost frames
-// are enough.
+// the numbers may fit again. The run of lost frames then has the number of frames of a datagram.
+// For a longer datagram, the run is 16 (32 …) frames shorter. 18 frames are the worst case, because
+// two lost frames are enough.
 TEST(IsotpLoss, SeldomJoinsTwoDatagrams) {
   const struct {
     Stream stream;

@@ -48,7 +48,7 @@ struct Receiver {
     return arrival.error;
   }
   IsotpError take(const std::string& hex) { return take(frame_of(id, hex)); }
-  // The flow control that the receiver sends now. Empty if there is none.
+  // The flow control that the receiver sends now. Empty if there is no flow control.
   std::string answer() {
     CanFrame frame;
     if (!isotp.offer(now, frame)) return "";
@@ -315,8 +315,8 @@ TEST(IsotpReceiver, AMalformedFrameDoesNotInterrupt) {
   expect_counters_add_up(receiver.isotp);
 }
 
-// A frame that arrives in time may be read late. Before that, the caller may request a frame to
-// send.
+// A frame that arrives in time may be read late. Before this read, the caller may request a frame
+// to send.
 TEST(IsotpReceiver, ALatePollDoesNotTimeOutTheTransfer) {
   Receiver receiver(controlled());
   receiver.take("10 0A 01 02 03 04 05 06");

@@ -150,8 +150,8 @@ TEST(IsotpSender, TimesOutWhenTheBusDoesNotAcceptAFrame) {
   }
 }
 
-// Flow control that arrives in time may be read late. Before that, the caller may request a frame
-// to send.
+// Flow control that arrives in time may be read late. Before this read, the caller may request a
+// frame to send.
 TEST(IsotpSender, ALatePollDoesNotTimeOutTheTransfer) {
   Sender sender(classic());
   sender.start(counted(10));

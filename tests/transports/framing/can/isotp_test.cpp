@@ -136,7 +136,7 @@ class IsotpBus {
   IsotpSender sender;
 
  private:
-  // Advances to the next deadline, or by 200 us if the bus refuses a frame.
+  // If the bus refuses a frame, advances by 200 us. Otherwise advances to the next deadline.
   void advance() {
     std::uint32_t wait = 200;
     const IsotpDeadline deadlines[] = {sender.deadline(), receiver.deadline()};

@@ -444,7 +444,7 @@ RC_GTEST_PROP(PackedForm, AnyBytesUnpackSafelyToTheGrammarOrARefusal, ()) {
   RC_ASSERT(result.size <= capacity);
   RC_ASSERT(static_cast<bool>(result) == (result.size != 0));
   if (!result) return;
-  // With the right checksum the result is a datagram, unless a PNum or T is out of range.
+  // If PNum and T are in range, the result with the right checksum is a datagram.
   out.resize(result.size);
   Datagram datagram;
   const ReadResult read_result = read_datagram(out, datagram);

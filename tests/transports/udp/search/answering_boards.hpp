@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Boards on the loopback that answer every datagram, each board at a different address and all
-// boards at one port. They run in a thread, because a search blocks.
+// boards at one port. The boards run in a thread, because a search blocks.
 #pragma once
 
 #include <asio/executor_work_guard.hpp>

@@ -18,7 +18,7 @@ class UdpSearchTest : public testing::Test {
  protected:
   UdpSearchTest() { lookup.retry = lookup.silence = milliseconds(20); }
 
-  // Makes a host that is not open. It searches for boards at `places`.
+  // Makes a host that is not open, and that searches for boards at `places`.
   void make(const std::string& url, const std::vector<std::string>& places = {"0.2", "0.3"}) {
     BoardSearch search = boards.search();
     search.patience = milliseconds(60);

@@ -148,7 +148,7 @@ TEST(I2cBusModel, AnInterruptingTransferCutsATransferShort) {
   const auto& all = bench.log.transfers();
   ASSERT_EQ(all.size(), 4U);
   EXPECT_EQ(all.back().result, I2cResult::timeout);
-  // The interrupted transfer takes the time of the other transfers and of its own two bytes. It
+  // The interrupted transfer takes the time of the other transfers and of its own two bytes, and
   // does not wait for a held line.
   EXPECT_EQ(all.back().duration_ns,
             all[0].duration_ns + all[1].duration_ns + all[2].duration_ns + (9 + 1) * 2500U);
