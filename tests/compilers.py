@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compiles the product with compilers other than the default: tests/compilers.py FOLDER [JOBS] [COMPILER...]
 
-All warnings are errors. No code is generated, so warnings of the optimizer come only in the build. Without a COMPILER
+All warnings are errors. No code is generated, so warnings of the optimizer appear only in the build. Without a COMPILER
 (such as g++-11) the oldest installed GCC reads all sources, and the newest GCC and the oldest clang read the public
 headers. tools/test builds the tree with the default compiler and with the newest clang. Each compiler gets a configured
 build in FOLDER.
@@ -50,7 +50,7 @@ def chosen():
 
 
 def run(command, folder=ROOT):
-    """Returns the output of a command if it fails, else an empty text."""
+    """If the command fails, returns the command's output, else an empty text."""
     ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     return f'{shlex.join(map(str, command))}\n{ended.stdout}{ended.stderr}' if ended.returncode else ''
 

@@ -3,8 +3,8 @@
 """Checks the first pages and files that a visitor sees. Usage: front_door.py TREE
 
 Workflows, actions and issue forms are valid for GitHub. The tools in these files and in the top pages exist, and accept
-the options. The changelog and the packages have this version. The site can be made: every link has a target, and
-Doxygen understands the headers.
+the options in these places. The changelog and the packages have this version. The site can be made, because every link
+has a target, and Doxygen understands the headers.
 """
 import pathlib
 import re
@@ -15,7 +15,7 @@ import tempfile
 import yaml
 
 TOOL = re.compile(r'(?<![\w/.])((?:tools|\.ci)/[\w-]+)(?![\w/])([^`|;&\n]*)')
-RUNNERS = {'tools/on', 'tools/with-can'}  # they run a command, which has its own options
+RUNNERS = {'tools/on', 'tools/with-can'}  # these tools run a command, which has its own options
 FIELDS = {'dropdown', 'textarea', 'input', 'checkboxes', 'markdown'}
 
 

@@ -5,8 +5,8 @@
 The layers are tools > host > transports > protocol, and tools > firmware > transports/framing > protocol. ALLOWED orders
 the rooms of a layer. Only host/standard_registry.cpp may include firmware/ports/sim. The public headers, include/r4link,
 are below all layers. The portable rooms (protocol, transports/framing, firmware without its ports, the chip models)
-use only headers that a C++14 board has. The same is true for the public headers that they include.
-A room holds at most 20 sources, a source at most 430 lines.
+and the public headers that these rooms include use only headers that a C++14 board has.
+A room holds at most 20 sources. A source has at most 430 lines.
 """
 import collections
 import pathlib

@@ -3,8 +3,8 @@
 """Counts the tests that tools/test ran. Usage: summary.py BUILD
 
 Reads BUILD/results/*.xml (ctest), BUILD/[asan|tsan/]junit/*.xml (pytest, in place of the one
-ctest entry of the file) and BUILD/results/checks.txt. Names every failed and every skipped test;
-a skipped test counts as failed. Names the tests that were repeated because the machine stood still
+ctest entry of the file) and BUILD/results/checks.txt. Names every failed and every skipped test.
+A skipped test counts as failed. Names the tests that were repeated because the machine stood still
 (main.cpp, integration/repeat.py), and the tests that failed beside other tests and were repeated alone.
 The result in NAME.alone.xml replaces the result in NAME.xml. The last line is `N passed, N failed`.
 """

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """clang-tidy over the product's sources: tests/tidy.py BUILD [JOBS] [--all]
 
-Without --all: only sources in folders that differ from origin/main or, on main itself, from 20 commits ago.
+Without --all, checks only sources in folders that differ from origin/main or, on main itself, from 20 commits ago.
 BUILD is configured with -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DR4_UNITY=ON. Files that are one source for the
 compiler (cmake/layers.cmake) are one source for clang-tidy, which then reads the headers once instead of a dozen times.
-Their texts are joined, not included, because the analyzer follows only code in the file that it is given.
+The texts of these files are joined, not included, because the analyzer follows only code in the file that it is given.
 """
 import collections
 import concurrent.futures
@@ -18,7 +18,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CHECKED = tuple(f"{ROOT / folder}/" for folder in ("protocol", "transports", "firmware", "host", "tools"))
 # clang 14 has coroutines, but libstdc++ and Asio do not detect them. The analyzer gets a tenth of its usual limit of
-# paths per function: this takes half the time, and follows thousands of paths.
+# paths per function. This limit halves the time, and the analyzer still follows thousands of paths.
 EXTRA = ["-D__cpp_impl_coroutine=201902L", "-DASIO_HAS_CO_AWAIT", "-DASIO_HAS_STD_COROUTINE",
          "-Xclang", "-analyzer-config", "-Xclang", "max-nodes=20000"]
 UNKNOWN_TO_CLANG = " -fno-gnu-unique"
@@ -55,7 +55,7 @@ def files_of(entry):
 
 
 def sources_of(build):
-    """Writes the inputs of clang-tidy and their compilation database to BUILD/tidy; returns path -> Source."""
+    """Writes the inputs of clang-tidy and their compilation database to BUILD/tidy, and returns path -> Source."""
     folder = build / "tidy"
     folder.mkdir(exist_ok=True)
     sources, database, seen = {}, [], set()
@@ -122,7 +122,7 @@ def main():
     if changed is not None:
         sources = {path: source for path, source in sources.items()
                    if any(file.parent in changed for file in source.files)}
-    # The largest sources first, because they take longest.
+    # The largest sources are first, because these sources take longest.
     order = sorted(sources, key=lambda path: -sum(file.stat().st_size for file in sources[path].files))
     found = 0
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:

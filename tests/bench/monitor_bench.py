@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cost of a board and its monitor at 100 Hz: their shares of a processor. The goal is 2 % each.
+"""The shares of a processor that a board and its monitor use at 100 Hz. The goal is 2 % for each program.
 
     R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/monitor_bench.py [SECONDS]
 """

@@ -4,7 +4,7 @@
 
     PYTHONPATH=build/python R4=build/r4 tests/bench/python_bench.py [SECONDS]
 
-Exit code 1 if a limit is missed. The processor time is that of this process, link and interpreter together.
+Exit code 1 if a limit is exceeded. The processor time is the time of this process: link and interpreter together.
 """
 import asyncio
 import os
@@ -42,7 +42,7 @@ def processor_s():
 
 
 class Count:
-    """Reads one field of each state: the least work of a program."""
+    """Reads one field of each state, which is the least work of a program."""
 
     def __init__(self):
         self.number = 0

@@ -1,13 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cost of recording eight boards at 100 Hz: all of r4 record, as a share of one processor.
+"""The cost of recording eight boards at 100 Hz: the share of one processor that all of r4 record uses.
 
     R4=build/r4 tests/bench/recording_bench.py [SECONDS] [ROUNDS]
 
-In each round three programs receive the same eight boards over UDP loopback, one after the other: r4 record into text,
-r4 record into zst, and a reference in C. The reference waits in epoll, reads the datagrams, and does nothing else.
-The kernel's account of the threads gives the processor time of each program, without its start. Prints medians over
-the rounds.
+In each round three programs receive the same eight boards over UDP loopback, one after the other. The programs are
+r4 record into text, r4 record into zst, and a reference in C. The reference waits in epoll, reads the datagrams, and
+does nothing else. The kernel's account of the threads gives the processor time of each program, without the program's
+start. Prints medians over the rounds.
 """
 import glob
 import json
@@ -78,7 +78,7 @@ def used_ns(pid):
 
 
 def share_of(command, seconds):
-    """The share of a core that a program uses after its start, and its output after SIGINT has ended it."""
+    """The share of a core that a program uses after its start, and all output of the program."""
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         time.sleep(START_S)
         began, before = time.monotonic(), used_ns(process.pid)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cost of r4 ros2 with one simulated board at 100 Hz and a client of Fast DDS: its share of a core, and the time from
-a command through ~/send to the board's confirmation at the client. Each command is sent immediately after the
-confirmation of the previous command, and so just after a state, which makes its wait the longest.
+"""The cost of r4 ros2 with one simulated board at 100 Hz and a client of Fast DDS: the share of a core, and the time
+from a command through ~/send to the board's confirmation at the client. The client sends each command immediately
+after the previous confirmation. At that time a state has just been sent, so the wait for the next state is the longest.
 
     R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/ros2_command_bench.py [COMMANDS, 500]
 
-Exit code 1 if a limit is missed: 3 % of a core; half of the confirmations within one period and 2 ms.
+Exit code 1 if a limit is exceeded: 3 % of a core, or one period and 2 ms for half of the confirmations.
 """
 import os
 import statistics

@@ -5,16 +5,16 @@
     PYTHONPATH=build/python R4=build/r4 tests/bench/sharing_bench.py udp|pty|can|usb|URL [SECONDS] [ROUNDS] [--trouble]
 
 udp and pty are on this machine, with a simulated board. can and usb are in a guest of tools/with-can, whose processor
-is emulated: the bus vcan0 with a simulated board, and a USB serial port with a simulated board at its other end. URL is
-a bus of this machine, on which this program simulates a board, or a serial port with a board at its other end.
+is emulated. can is the bus vcan0, and usb is a USB serial port, each with a simulated board. URL is a bus of this
+machine, on which this program simulates a board, or a serial port with a board at its other end.
 
 In each round the program drives alone, then beside five watching programs (r4 monitor, r4 record, and three other
 programs), then alone again. The difference between the two times alone is the noise of the machine. The
 benchmark measures the processor time of the program. The program's own recording gives the age of states at their
 arrival (relative to the fastest), the intervals of heartbeats, and the number of missing packet numbers. With --trouble
-one of the five is stopped (SIGSTOP) all the time, and one is killed half way. Then the driving program is killed beside
-five such programs: this measures the states that r4 record misses. Then r4 stop runs beside all programs, and three
-r4 send in a row.
+one watching program is stopped (SIGSTOP) all the time, and another is killed half way. Then the driving program is
+killed beside five watching programs, which shows the number of states that r4 record loses. Then r4 stop runs beside
+all programs, and three r4 send in a row.
 Prints medians over the rounds, and the sum of all missing packet numbers.
 """
 import argparse
@@ -68,7 +68,7 @@ def ms(seconds):
 
 
 class SimulatedBoard:
-    """r4 sim on a transport, and the lines that it prints with their times."""
+    """r4 sim on a transport, and the lines that r4 sim prints, with the times."""
 
     def __init__(self, where):
         url = {'udp': 'udp://127.0.0.1:0', 'pty': 'pty:'}.get(where, where)
@@ -131,7 +131,7 @@ def datagrams_of(path):
 
 
 def of_recording(path):
-    """Ages of the states and intervals of the heartbeats, in seconds; the number of missing packet numbers."""
+    """The ages of the states and intervals of the heartbeats, in seconds, and the number of missing packet numbers."""
     states, beats, numbers = [], [], []
     for at, what, datagram in datagrams_of(path):
         fields = dict(part.split(':', 1) for part in datagram.split('^')[0].split(';') if ':' in part)
@@ -197,8 +197,8 @@ def drive(board, seconds, folder, others=False, trouble=False):
 
 
 def stop_beside_all(board, folder):
-    """The time that r4 stop reports, and the time from its start to safe outputs, while another program drives and
-    five programs watch."""
+    """The time that r4 stop reports, and the time from the start of r4 stop to safe outputs, while another program
+    drives and five programs watch."""
     path = os.path.join(folder, f'{time.monotonic_ns()}.r4log')
     with five_watchers(board.url, folder), \
             subprocess.Popen([sys.executable, '-c', DRIVER, board.url, path, '1', 'wait'], stdin=subprocess.PIPE,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cost of browsers for r4 web: its share of a processor and its memory, with eight simulated boards at 100 Hz.
+"""The cost of browsers: the share of a processor and the memory of r4 web, with eight simulated boards at 100 Hz.
 
     R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/web_bench.py [SECONDS]
 """

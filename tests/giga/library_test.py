@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Arduino library compiles unchanged for the Giga's processor and its dialect of C++. It needs no heap and, apart
-from the core, no other library. The stacks of its interrupts are large enough.
+"""The Arduino library compiles unchanged for the Giga's processor and its dialect of C++. The library needs no heap
+and, apart from the core, no other library. The stacks of the library's interrupts are large enough.
 
 The core is not available here. tests/giga/core declares the parts that the firmware uses, with the signatures and
 macros of the originals. Usage: library_test.py TREE
@@ -25,10 +25,10 @@ FLAGS = ['-std=gnu++14', '-fno-rtti', '-fno-exceptions', '-Os', '-mcpu=cortex-m7
          '-Wall', '-Wextra', '-Wvla', '-Werror']
 # The core itself allows exceptions on the Giga, and will use C++17.
 OTHER_DIALECT = ['-fexceptions', '-std=gnu++17', '-fsyntax-only']
-# Code that needs such a symbol uses the heap, or can throw.
+# Code that needs one of these symbols uses the heap, or can throw.
 FORBIDDEN = re.compile(r'\b(malloc|calloc|realloc|free|_Zn[wa]\w*|_Zd[la]\w*|__cxa_throw\w*|_ZSt\d+__throw\w*)$')
 # The destructor of Mbed's SocketAddress frees its text (delete[]). Only get_ip_address() makes the text. The library
-# does not call it: _ZNK13SocketAddress14get_ip_addressEv is not among the symbols that the library needs.
+# does not call this function: the library does not need the symbol _ZNK13SocketAddress14get_ip_addressEv.
 GIVEN_BACK = {'_ZdaPv': 'firmware/ports/giga/links/network.cpp'}
 TEXT_OF_ADDRESS = '_ZNK13SocketAddress14get_ip_addressEv'
 SHELL = {'library.properties', 'library.json', 'keywords.txt', 'LICENSE', 'src/R4Link.h',
@@ -43,7 +43,7 @@ def run(*command):
 
 
 def assemble(tree, folder):
-    """Unpacks the library. Assembling it twice gives the same file."""
+    """Unpacks the library. Asserts that a second assembly makes the same file."""
     first, second = folder / 'a.zip', folder / 'b.zip'
     for target in (first, second):
         run(tree / 'tools/arduino', target)
@@ -66,7 +66,7 @@ def refuses_what_it_cannot_do(tree):
 
 
 def compile_all(tree, library, out):
-    """Compiles every source, and the sketch as the IDE does: after Arduino.h."""
+    """Compiles every source, and the sketch after Arduino.h, as the IDE does."""
     sketch = out / 'sketch.cpp'
     example = library / 'examples/R4Board/R4Board.ino'
     sketch.write_text(f'#include <Arduino.h>\n#line 1 "{example}"\n{example.read_text()}')
@@ -108,7 +108,7 @@ def uses_no_heap(objects, lacking):
 
 
 def stacks_suffice(out):
-    """Our interrupt handlers fit on their stacks. Checked if the compiler reports call graphs."""
+    """If the compiler reports call graphs, asserts that our interrupt handlers fit on their stacks."""
     graphs = list(out.glob('*.ci'))
     for name, (need, room) in (stack_bounds(graphs) if graphs else {}).items():
         print(f'stack of the interrupts, {name}: {need} of {room} bytes')

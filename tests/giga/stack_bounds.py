@@ -50,7 +50,7 @@ def stack_bounds(files):
     gives_way = depth('hear_usb_now') + CORE_READ
     at_once = depth('pass_millisecond', 'look', 'step', 'hear_can')
     return {
-        # Handlers of the core may interrupt our handler that gives way. They need at most the core's own stack. Our other
+        # Handlers of the core need at most the core's stack, and may interrupt our handler that gives way. Our other
         # handlers may interrupt all these handlers.
         'ours': (gives_way + CORE_STACK + EXCEPTION_FRAME + at_once + SWITCH, OWN_STACK),
         'the core\'s, of us': (SWITCH + depth('on_millisecond', 'on_stop', 'on_step_timer', 'on_can', 'on_usb',

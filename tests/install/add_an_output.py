@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adds the output of docs/design/contributing.md to a copy of the tree and drives it. Usage: add_an_output.py TREE CXX"""
+"""Adds and drives the output of docs/design/contributing.md in a copy of the tree. Usage: add_an_output.py TREE CXX"""
 import pathlib
 import re
 import shutil
@@ -18,7 +18,7 @@ HOST = ('host/commands/command_*.cpp', 'host/commands/setpoints.cpp', 'transport
 
 
 def edits(page):
-    """(path, old text, new text) of each hunk in the page's first diff. Only the lines after `@@` count."""
+    """(path, old text, new text) of each hunk in the page's first diff. Ignores the line of each `@@`."""
     path = None
     for part in re.split(r'^(?=\+\+\+ |@@)', re.search(r'^```diff\n(.*?)^```', page, re.M | re.S)[1], flags=re.M):
         head, _, body = part.partition('\n')

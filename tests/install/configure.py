@@ -18,7 +18,7 @@ def without(*packages):
 
 
 def configure(*options):
-    """Returns (True if it works, its output in one line)."""
+    """Returns (True if CMake succeeds, CMake's output in one line)."""
     with tempfile.TemporaryDirectory() as folder:
         ended = subprocess.run(['cmake', '-G', 'Ninja', '-S', TREE, '-B', folder, '-DR4_TESTS=OFF', *options],
                                capture_output=True, text=True, check=False)

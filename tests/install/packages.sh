@@ -1,9 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Tests the Debian packages. Usage: packages.sh SOURCE BUILD
-# Makes packages of the build in BUILD, runs lintian, and installs the packages into a copy of this system. There it uses
-# them (packages_inside.sh) and purges them: no file may remain. The copy is an overlay over the files of this system,
-# which needs root or user namespaces.
+# Makes packages of the build in BUILD, runs lintian, and installs the packages into a copy of this system. Uses the
+# packages there (packages_inside.sh) and purges them. No file may remain. The copy is an overlay over the files of this
+# system. An overlay needs root or user namespaces.
 set -euo pipefail
 
 source_tree=$(realpath "$1")
@@ -31,7 +31,7 @@ for folder in tmp run dev; do
   mount -t tmpfs tmpfs "$copy/root/$folder"
 done
 mount -t proc proc "$copy/root/proc"
-# Its own devices, so that the packages cannot reach the devices of this system.
+# The copy has its own devices, so that the packages cannot reach the devices of this system.
 for device in null zero full random urandom; do
   touch "$copy/root/dev/$device"
   mount --bind "/dev/$device" "$copy/root/dev/$device"

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs the packages in its folder, uses each, and purges them. packages.sh runs it in a copy of the system. clean.sh
-# runs it in a minimal system with --apt, which also installs the dependencies and the programs that the steps use.
+# Installs the packages in its folder, uses each, and purges them. packages.sh runs it in a copy of the system. In a
+# minimal system clean.sh runs it with --apt, which also installs the dependencies and the programs of the steps.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 

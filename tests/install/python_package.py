@@ -12,7 +12,7 @@ from running import OFFLINE, ROOT, run
 
 
 def test_the_package_and_examples_pass_strict_type_checks():
-    """One run for all files, because the types of the standard library take most of the time, and mypy caches them."""
+    """One run checks all files, because the types of the standard library, which mypy caches, take most of the time."""
     package, examples = ROOT / 'host/python/r4link', ROOT / 'docs/examples'
     sources = [*package.glob('*.py'), package / '_core.pyi', *(examples / 'python').glob('*.py'),
                examples / 'openscout/openscout.py']
@@ -33,7 +33,7 @@ def test_installs_into_a_venv_and_builds_a_source_distribution(tmp_path):
     with tarfile.open(source) as archive:
         names = archive.getnames()
         archive.extractall(tmp_path / 'source')
-    # The source distribution is complete: it configures in a new folder, as a build without R4_BUILD does.
+    # The source distribution is complete, because it configures in a new folder, as a build without R4_BUILD does.
     run(sys.executable, '-c', 'import build_backend; build_backend.configure("build")',
         cwd=tmp_path / 'source' / f'r4link-{r4link.__version__}',
         env={**OFFLINE, 'PYTHONPATH': 'host/python'})

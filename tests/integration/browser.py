@@ -12,7 +12,7 @@ NODE_MODULES = TESTS.parent / 'build/npm/node_modules'
 
 
 class Browser:
-    """Opens pages; each page has its own storage."""
+    """Opens pages, each with its own storage."""
 
     def __init__(self):
         assert (NODE_MODULES / 'puppeteer-core').is_dir(), f'{NODE_MODULES} has no puppeteer-core; tools/setup --can installs it'
@@ -52,14 +52,14 @@ class BrowserPage:
         return self.do('evaluate', script=script)
 
     def until(self, script, timeout=PATIENCE_S):
-        """Waits until the script's value is true; returns the value."""
+        """Waits until the script's value is true, and returns the value."""
         return self.do('until', script=script, timeout_ms=1000 * timeout)
 
     def text(self, selector):
         return self.evaluate(f'document.querySelector({selector!r}).textContent')
 
     def until_text(self, selector, part, timeout=PATIENCE_S):
-        """Waits until the element is visible and its text contains `part`; returns all of its text."""
+        """Waits until the element is visible and its text contains `part`, and returns all of its text."""
         return self.until(f'(() => {{ const it = document.querySelector({selector!r}); return it && !it.hidden && '
                           f'it.textContent.includes({part!r}) && it.textContent; }})()', timeout)
 

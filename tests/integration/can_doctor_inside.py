@@ -35,7 +35,7 @@ def queue(name):
 
 @pytest.fixture(name='controller')
 def can0():
-    """can0; restores the guest's setup at the end."""
+    """Yields can0, and restores the guest's setup at the end."""
     yield 'can0'
     ip('set', 'can0', 'down')
     ip('set', 'can0', 'up', 'txqueuelen', '1000', 'type', 'can', 'bitrate', '1000000', 'restart-ms', '100')

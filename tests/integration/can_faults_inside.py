@@ -61,7 +61,7 @@ def goes_safe(board):
 
 
 def drives_again(board, since):
-    """The session resumes by itself, with the outputs that it commanded earlier."""
+    """Asserts that the session resumes by itself, with the outputs that the session commanded earlier."""
     back = board.outputs(lambda outputs: outputs['osmc'][0] == DRIVING)
     print(f'drives again after {(back["came"] - since) * 1000:.0f} ms')
 
@@ -82,7 +82,7 @@ def test_the_reported_load_equals_the_busy_time_of_the_bus(bus, board):
         after = bus.status()
     busy_us, frames = (after[each] - before[each] for each in ('busy_us', 'frames'))
     print(f'a frame {1e6 * shown["load"] / shown["frames"]:.2f} us, by the bus {busy_us / frames:.2f} us')
-    assert shown['bitrate'] == BITRATE  # read from the controller: no option gives it
+    assert shown['bitrate'] == BITRATE  # read from the controller, because no option gives the bit rate
     assert after['failed'] == 0
     assert abs(1e6 * shown['load'] / shown['frames'] / (busy_us / frames) - 1) < 0.01
 
@@ -199,9 +199,9 @@ def test_the_bus_repeats_damaged_frames_of_a_datagram(bus):
     failed, frames = (status[each] - before[each] for each in ('failed', 'frames'))
     transfers = next(each['fields'] for each in log if each['type'] == 'transfers')
     print(f'{failed} of {frames} frames damaged, {transfers}')
-    assert frames >= 500 and failed >= 5  # random: five times these numbers are likely
+    assert frames >= 500 and failed >= 5  # the numbers are random, and five times as many are likely
     assert transfers['packed'] >= 100
-    # timed_out and interrupted are not asserted. An end in the guest may pause for longer than N_Bs (20 ms). Then the
+    # timed_out and interrupted are not asserted: an end in the guest may pause for longer than N_Bs (20 ms). Then the
     # other end abandons its transfer and begins the next, with or without noise.
     lost = ('wrong_sequence', 'overflow', 'malformed', 'bad_form', 'dropped_frames')
     assert sum(transfers[each] for each in lost) <= failed / 4, transfers
@@ -278,4 +278,4 @@ def test_a_stop_overtakes_a_full_queue():
             stop.process.stderr.close()
         ids = [frame for at, (frame, _) in zip(dump.times, dump.frames) if at > went_on and frame in OF_HOST]
         print(f'{ids.index(STOP)} frames before the stop')
-        assert ids.index(STOP) <= 4, ids  # three mailboxes and the frame in the driver come first
+        assert ids.index(STOP) <= 4, ids  # the frames in three mailboxes and in the driver are sent first

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tests that test_can.py runs where SocketCAN exists: boards and hosts as processes on a CAN bus.
 
-vcan0 is a bus in the kernel, can0 and can1 are two controllers with their driver on one bus.
+vcan0 is a bus in the kernel. can0 and can1 are two controllers with their driver on one bus.
 """
 import contextlib
 import re
@@ -25,7 +25,7 @@ def ip(*arguments):
     subprocess.run(['ip', *arguments], check=True)
 
 
-# A frame takes the emulated machine about 100 us, and a state in plain text has 25 frames. So tests that do not
+# The emulated machine needs about 100 us for a frame, and a state in plain text has 25 frames. So tests that do not
 # test the rate use a lower rate. tests/simulation/can_capacity_test.cpp tests 100 Hz, in virtual time.
 PERIOD_MS = 50
 SLOWLY = ('--set', f'rate,{1000 // PERIOD_MS}')
@@ -34,7 +34,7 @@ PATIENTLY = (*SLOWLY, '--set', 'timeout,5000')
 
 
 def on_vcan():
-    """A board on a bus in the kernel; its hosts use plain text."""
+    """A board on a bus in the kernel. The hosts use plain text."""
     board = Board(BUS, options=PATIENTLY)
     board.bus, board.packs = 'vcan0', False
     board.host_url = IN_PLAIN_TEXT
@@ -42,7 +42,7 @@ def on_vcan():
 
 
 def on_controllers(options=PATIENTLY):
-    """A board at one of two controllers with their driver; its hosts use the other controller and the packed form."""
+    """A board at one of two controllers with their driver. The hosts use the other controller and the packed form."""
     board = Board('can://can0?node=3', options=options)
     board.bus, board.packs = 'can1', True
     board.host_url = 'can://can1?node=3'
@@ -194,7 +194,7 @@ def test_the_board_obeys_a_stop_frame_from_another_program(board):
 def test_a_second_host_is_refused_while_the_first_has_control(board):
     with monitor(board.host_url) as first:
         in_control(first)
-        # From this computer, and as from another computer on the same bus.
+        # can1 is the interface of the first host. can0 acts as another computer on the same bus.
         for command, where, why in (
                 (('send', '--timeout', '2', 'O:358,1,1'), 'can1', f'controlled by r4 (pid {first.process.pid})'),
                 (('send', '--timeout', '2', 'O:358,1,1'), 'can0', 'another host'),

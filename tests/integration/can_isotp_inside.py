@@ -26,7 +26,7 @@ def test_every_test_of_can_test_is_executed_and_passes():
                             text=True, check=False)
     print(result.stdout[-20000:])
     assert result.returncode == 0, result.stdout[-20000:] + result.stderr[-20000:]
-    # Other runs repeat the tests that failed while the machine stood still.
+    # If tests failed while the machine stood still, other runs repeat these tests.
     assert re.findall(r'^\[==========\] (\d+) tests? from \d+ test suites? ran\.', result.stdout,
                       re.MULTILINE)[0] == str(count)
     passed = re.findall(r'^\[  PASSED  \] (\d+) tests?\.', result.stdout, re.MULTILINE)

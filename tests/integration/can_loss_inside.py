@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tests that test_can.py runs where SocketCAN exists: lost, late and corrupt frames, and ends that disconnect.
 
-netem loses and delays frames on the pair vxcan0, vxcan1; cangw corrupts frames that it carries from vcan0 to vcan1.
+netem loses and delays frames on the pair vxcan0, vxcan1. cangw corrupts frames that it carries from vcan0 to vcan1.
 """
 import collections
 import contextlib
@@ -145,7 +145,7 @@ def test_a_corrupt_command_is_never_executed(form, corrupt):
     with Gateway() as gateway, Board(f'can://vcan0?node={NODE}', options=PATIENTLY) as board:
         with Running('send', host_url, '--timeout', '20', '--json', *commands) as sender, Dump('vcan1') as dump:
             board.executed(commands[0], timeout=20)
-            for byte in corrupt:  # of the eight bytes of a frame
+            for byte in corrupt:  # the index in the eight bytes of a frame
                 mask = bytearray(8)
                 mask[byte] = 0x01 if byte % 2 == 0 else 0x20
                 gateway.carry('-m', f'XOR:D:0.0.{mask.hex().upper()}')
@@ -184,7 +184,7 @@ class RawHost:
         self.socket.send(struct.pack('=IB3x8s', COMMAND, len(data), data))
 
     def send(self, datagram, frames=99):
-        """Sends at most `frames` frames of a datagram; waits for flow control after the first frame."""
+        """Sends at most `frames` frames of a datagram, and waits for flow control after the first frame."""
         self.frame(bytes([0x10, len(datagram)]) + datagram[:6])
         while self.socket.recv(16)[8] >> 4 != 3:
             pass

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that test_can.py runs where SocketCAN exists: a board on two buses, of which one bus fails, and a board on
+"""Tests that test_can.py runs where SocketCAN exists: a board on two buses, one of which fails, and a board on
 a bus and a cable."""
 import contextlib
 import fcntl
@@ -95,7 +95,7 @@ def test_each_command_is_executed_once_while_buses_fail_and_recover():
                 ip('link', 'set', bus, 'down')
                 confirmed(commands[40 * i + 20:40 * i + 40])
                 ip('link', 'set', bus, 'up')
-                board.next(has_joined(2))  # until then the board has only one path, which must not fail
+                board.next(has_joined(2))  # before this event the board has only one path, which must not fail
             confirmed(commands[80:])
         executed = [each['executed']['command'] for each in board.rest() if 'executed' in each]
     assert [each for each in executed if each.startswith('S:')] == commands
@@ -134,7 +134,7 @@ def test_a_session_survives_the_loss_of_its_cable_or_its_bus(tmp_path_factory):
 
 
 def test_a_session_survives_bus_off_at_the_board_or_at_the_host():
-    """can0 and can1 are one bus; the ends of the other bus have error counters and bus-off."""
+    """can0 and can1 are one bus. The ends of the other bus have error counters and bus-off."""
     boards, hosts = (('can0', 'slcan0'), ('can1', 'slcan1'))
     with SlcanBus(2, 500000) as bus, \
             Board(*(f'can://{each}?node=3' for each in boards), options=PATIENTLY) as board, \
@@ -147,7 +147,7 @@ def test_a_session_survives_bus_off_at_the_board_or_at_the_host():
 
         def heal(node):
             bus.order('heal', node)
-            switch(f'slcan{node}', up=False)  # the kernel sometimes takes more than a second for this
+            switch(f'slcan{node}', up=False)  # the kernel sometimes needs more than a second for the switch
             return lambda: switch(f'slcan{node}', up=True)
 
         host.loses('//slcan1', lambda: spoil(1))

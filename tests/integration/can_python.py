@@ -2,7 +2,7 @@
 """A host and a board on a CAN bus, frame by frame on python-can.
 
 A second implementation, written from docs/reference/protocol.md, docs/reference/can.md and
-docs/reference/packed.md: it shares no code with r4. No function sleeps: each waits for frames until a deadline.
+docs/reference/packed.md, without code of r4. No function sleeps: each function waits for frames until a deadline.
 """
 import random
 import threading
@@ -45,7 +45,7 @@ def read(text):
 # --- ISO-TP (can.md)
 
 class Receiver:
-    """Joins the frames of one id. `answer` sends flow control; with None, the receiver only listens."""
+    """Joins the frames of one id. `answer` sends flow control. If `answer` is None, the receiver only listens."""
 
     def __init__(self, answer=None, block_size=0, stmin=0):
         self.answer, self.block_size, self.stmin = answer, block_size, stmin
@@ -111,7 +111,7 @@ class Peer:
                                   data=bytes(data).ljust(size, b'\xcc')))
 
     def send_message(self, identifier, message, flow_control=True):
-        """Sends a whole message, and handles frames that arrive meanwhile. False if no receiver accepts it."""
+        """Sends a whole message, and handles frames that arrive meanwhile. False if no receiver accepts the message."""
         longest = 64 if self.fd else 8
         if len(message) <= 7:
             self.send_frame(identifier, bytes([len(message)]) + message)
@@ -223,7 +223,7 @@ class Host(Peer):
             self.next_beat = 0.0  # answer each heartbeat at once
 
     def send(self, fields):
-        """Sends a new datagram; returns its number and bytes."""
+        """Sends a new datagram, and returns its number and bytes."""
         self.pnum = (self.pnum + 1) % 2 ** 32
         text = datagram(fields, self.pnum, self.board_time, self.session)
         self._send_text(text)
@@ -236,7 +236,7 @@ class Host(Peer):
         self.send_frame(EMERGENCY_STOP, b'', raw=True)
 
     def run_until(self, done, timeout=10.0, retry=None):
-        """Keeps the link until `done()`; repeats the datagram `retry`."""
+        """Keeps the link until `done()`, and repeats the datagram `retry`."""
         deadline = time.monotonic() + timeout
         next_retry = time.monotonic() + RETRY_S
         while not done():
@@ -262,7 +262,7 @@ class Host(Peer):
         return self.find(is_it, start)
 
     def take_control(self):
-        """Waits until the board executes commands: it must first receive an echo of its T."""
+        """Waits until the board executes commands. The board must first receive an echo of its T."""
         self.next(lambda fields: 'AIN24' in fields)
         self.run_until(lambda: self.echoed)
         assert self.command('F:DEFAULT,SAFE,CMD') == 'done'
@@ -281,7 +281,7 @@ class Host(Peer):
 # --- a board
 
 class Board(Peer):
-    """The parts of a board that r4 needs: the link, F, O, Q, E:STOP, E:CLEAR. As a context, it runs in a thread."""
+    """The parts of a board for r4: the link, F, O, Q, E:STOP, E:CLEAR. As a context, the board runs in a thread."""
 
     def __init__(self, interface, node, fd=False, packs=True, obeys=True, refuses=()):
         super().__init__(interface, REPLIES + node, TO_BOARD + node, [EMERGENCY_STOP, TO_BOARD + node], fd)

@@ -15,7 +15,7 @@ from paper_client import PaperClient
 from r4_process import PATIENCE_S, Board, is_state, monitor, objects, run, send
 
 BOARD_URL, HOST_URL = 'can://vcan0?node=3', 'can://vcan0?node=4'
-# In the emulated machine Python takes half a millisecond for a frame. The machine sometimes pauses for a second.
+# In the emulated machine Python needs half a millisecond for a frame. The machine sometimes pauses for a second.
 PATIENTLY = ('--set', 'rate,20', '--set', 'timeout,5000')
 
 
@@ -29,7 +29,7 @@ def threads_that_take_turns_often():
 
 @contextlib.contextmanager
 def recording(path):
-    """Records vcan0 with candump -L, from before the block until after it."""
+    """Records vcan0 with candump -L, from before the block until after the block."""
     with open(path, 'w', encoding='ascii') as file, \
             subprocess.Popen(['candump', '-L', 'vcan0'], stdout=file) as process:
         try:
@@ -53,7 +53,7 @@ def running_board():
         yield board
 
 
-# --- python is the host, r4 sim the board
+# --- python is the host, r4 sim is the board
 
 @pytest.mark.parametrize('packs', [True, False])
 def test_a_python_host_drives_the_board_and_reads_its_state(board, tmp_path, packs):
@@ -171,7 +171,7 @@ def kernel_isotp(hears, own, flags=0):
 
 
 def test_the_papers_client_drives_a_board_over_the_kernels_iso_tp():
-    # A low rate: for each datagram the client sends seven commands, which take the emulated machine long.
+    # The rate is low, because for each datagram the client sends seven commands, which take the emulated machine long.
     options, listen_mode, states = ('--set', 'rate,2', '--set', 'timeout,5000'), 1, 6
     with Board(BOARD_URL, options=options) as board, \
             contextlib.closing(kernel_isotp(0x403, 0x7FF, listen_mode)) as telemetry, \
@@ -198,7 +198,7 @@ def test_the_board_answers_an_fd_host_in_fd(packs):
         board.executed('O:359,1,1')
 
 
-# --- python is the board, r4 the host
+# --- python is the board, r4 is the host
 
 def test_monitor_shows_the_states_of_a_python_board():
     with can_python.Board('vcan0', 4) as board, monitor(HOST_URL) as host:

@@ -14,11 +14,11 @@ RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'relay.py'
 REPORTED_WITHIN_S = 0.05  # if the system reports the loss of a path
 TIMEOUT_S = 1  # if only silence shows the loss
 BACK_WITHIN_S = 1
-LONGEST_GAP_S = 0.1  # states come every 10 ms
+LONGEST_GAP_S = 0.1  # the board sends a state every 10 ms
 
 
 class Relay:
-    """One path to a board; `url` is the host's end."""
+    """One path to a board. `url` is the host's end."""
 
     def __init__(self, kind, *where):
         self.kind, self.where = kind, where
@@ -53,7 +53,7 @@ class HostOnPaths(Running):
         self.ended = None
 
     def loses(self, place, take_away, within_s=REPORTED_WITHIN_S):
-        """Asserts a timely report of the loss, counted from the time that `take_away` returns or, for None, from its call."""
+        """Asserts a timely report of the loss. The time counts from the value of `take_away`, else from its call."""
         self._tells(place, False, take_away, within_s)
 
     def loses_by_silence(self, place, take_away):
@@ -74,7 +74,7 @@ class HostOnPaths(Running):
             self.next(is_command)
 
     def ends(self, board):
-        """Asserts that no state or command was missed, no command was executed twice, and the board never went safe."""
+        """Asserts that no state or command was lost, no command was executed twice, and the board never went safe."""
         commands = self.commands_at_its_end()
         log = board.rest()
         require_executed_as_told(commands, log)
@@ -82,7 +82,7 @@ class HostOnPaths(Running):
         assert not safe, safe
 
     def commands_at_its_end(self):
-        """Checks the log of the host alone; returns the commands and their results."""
+        """Checks the log of the host alone, and returns the commands and their results."""
         self.goes_on()
         self.ended = time.monotonic()
         self.process.stdin.close()
@@ -106,8 +106,8 @@ class HostOnPaths(Running):
 
 
 def require_executed_as_told(commands, log):
-    """Asserts that the board has executed each command at most once and in order: all confirmed commands, and no refused
-    command. `log` is the log of the board."""
+    """Asserts that the board has executed each command at most once and in order, each confirmed command once, and no
+    refused command. `log` is the log of the board."""
     executed = [each['executed']['command'] for each in log if 'executed' in each]
     executed = collections.deque(each for each in executed if each.startswith('S:'))
     for each in commands:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs test files where SocketCAN exists: in the guest of tools/with-can, or here if this is the guest.
+"""Runs test files where SocketCAN exists: in the guest of tools/with-can. If this is the guest, runs the files here.
 
 The tests run nowhere else, because a machine's own CAN interfaces may be connected to motors.
 A run fails if one of the tests was not executed.

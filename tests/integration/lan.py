@@ -49,7 +49,7 @@ def _be_a_computer(handed_over, *addresses):
 
 
 class Computer:
-    """A computer on the network. `inside`: arguments that start a process on it, as in run(…, **computer.inside)."""
+    """A computer on the network. `inside`: arguments that start a process there, as in run(…, **computer.inside)."""
 
     def __init__(self, *addresses):
         ours, theirs = socket.socketpair()
@@ -82,12 +82,12 @@ class Computer:
         self.addresses[0] = address
 
     def switch(self, number, state):
-        """Sets the interface 'up' or 'down'; returns the time of the kernel's report."""
+        """Sets the interface 'up' or 'down', and returns the time of the kernel's report."""
         return self._reported(number, lambda: subprocess.run(['ip', 'link', 'set', interface(number), state], check=True,
                                                              **self.inside))
 
     def plug(self, number, there):
-        """Pulls or plugs in the cable; returns the time of the kernel's report, at most one per second."""
+        """Pulls or plugs in the cable, and returns the time of the kernel's report (at most one report a second)."""
         return self._reported(number, lambda: fcntl.ioctl(self.taps[number], TUNSETCARRIER, struct.pack('i', there)))
 
     def _reported(self, number, change):

@@ -39,7 +39,7 @@ def steps_of(states, period_ms):
 
 
 class M7Board:
-    """A board on the emulated M7; with --pins it reports its pins."""
+    """A board on the emulated M7. With --pins the board reports its pins."""
 
     def __init__(self, *options):
         self.process = subprocess.Popen([M7, *options], stdout=subprocess.PIPE, text=True)
@@ -81,7 +81,7 @@ def fields_of(datagram):
 
 
 class Watcher:
-    """A UDP socket that the board has heard, and to which it sends its broadcasts."""
+    """A UDP socket from which the board has received, and to which the board sends its broadcasts."""
 
     def __init__(self, url):
         address, port = re.match(r'udp://(.+):(\d+)', url).groups()
@@ -136,7 +136,7 @@ class LineWatcher:
 
 
 class Relay(threading.Thread):
-    """Relays between a host and the board, and records the board's time at which the board last heard the host."""
+    """Relays between a host and the board, and records the board's time when the board last received from the host."""
 
     def __init__(self, url):
         super().__init__(daemon=True)

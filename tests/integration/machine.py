@@ -14,7 +14,7 @@ import time
 SANITIZED = 'R4_SANITIZER' in os.environ
 # True if a test can rely on bounds of milliseconds. False with a sanitizer, and in the guest of
 # tools/with-can, which emulates its processor. If false, a test asserts only the order of events,
-# and that no event comes too early.
+# and that no event occurs too early.
 PROMPT = not SANITIZED and 'R4_CAN_GUEST' not in os.environ
 LOOK_S = 0.1  # a wait between the last look at a program and its end is not counted
 

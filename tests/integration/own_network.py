@@ -13,9 +13,9 @@ held = []
 
 
 def enter():
-    """Called once, before any test. Only root may make a network; for other users the files run one after the other.
+    """Called once, before any test. Only root may make a network, so for other users the files run one after the other.
 
-    In the guest of tools/with-can it does nothing, because a new network would not have the guest's CAN interfaces.
+    In the guest of tools/with-can this does nothing, because a new network would not have the guest's CAN interfaces.
     """
     if 'R4_CAN_GUEST' in os.environ:
         return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A second implementation of the packed form, written from docs/reference/packed.md alone.
 
-pack(datagram) -> bytes, or None if it is sent as text; unpack(bytes) -> datagram, ValueError if malformed.
+pack(datagram) -> bytes, or None if the datagram is sent as text. unpack(bytes) -> datagram, ValueError if malformed.
 """
 import re
 

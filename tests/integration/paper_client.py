@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's Python client, as its section 8.6 describes it: it uses only plain text."""
+"""The paper's Python client, as the paper's section 8.6 describes it. The client uses only plain text."""
 import time
 import zlib
 
 
 class PaperClient:
-    """As printed: T comes before PNum, from the client's clock in whole seconds. The checksum is by hex().
+    """As printed: T precedes PNum, from the client's clock in whole seconds. hex() formats the checksum.
     The client answers each heartbeat, and sends seven commands for each received datagram. It sends from
-    one socket and listens on another. For the heartbeat, the paper calls a function appendMsg that it
-    does not define; here this is sendMsg. `send` takes the bytes of a datagram."""
+    one socket and listens on another. For the heartbeat, the paper calls a function appendMsg that the
+    paper does not define. Here sendMsg replaces appendMsg. `send` takes the bytes of a datagram."""
 
     def __init__(self, send):
         self.send = send

@@ -33,7 +33,7 @@ def run(*arguments, stdin='', timeout=PATIENCE_S, **options):
 
 
 def send(*arguments, timeout=60):
-    """Runs r4 send. Repeats it if the machine stood still and a command became too old for the board."""
+    """Runs r4 send. If the machine stood still and a command became too old for the board, runs r4 send again."""
     for _ in range(5):
         result = run('send', *arguments, timeout=timeout)
         if 'STALE' not in result.stderr:
@@ -66,7 +66,7 @@ def objects(text):
 
 
 def free_port():
-    """A free UDP port below 32768, where Linux begins to assign ports to sockets that ask for any port."""
+    """A free UDP port below 32768, where Linux begins to assign ports to sockets that request any port."""
     while True:
         port = random.randrange(30_000, 32_768)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, contextlib.suppress(OSError):
@@ -123,7 +123,7 @@ def again(write, wait):
 
 
 class Running:
-    """A running r4, or another program. Keeps each line of its stdout with the time of its arrival."""
+    """A running r4, or another program. Stores each line of the program's stdout with the time of arrival."""
 
     def __init__(self, *arguments, program=R4, **options):
         self.process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE,
@@ -145,7 +145,7 @@ class Running:
         self.errors = self.process.stderr.read()
 
     def next(self, is_it=lambda each: True, timeout=PATIENCE_S):
-        """Returns the next object for which `is_it` is true; `came` is the time of its arrival."""
+        """Returns the next object for which `is_it` is true. `came` in the object is the time of arrival."""
         deadline = time.monotonic() + timeout
         while True:
             try:
@@ -170,7 +170,7 @@ class Running:
             self.lines.get()
 
     def stall(self, seconds):
-        """Stops the program for a time and drops its earlier objects; returns the time at which it resumed."""
+        """Stops the program for a time and drops its earlier objects. Returns the time at which the program resumed."""
         self.signal(signal.SIGSTOP)
         lasts(seconds)
         self.skip_past()
@@ -181,18 +181,18 @@ class Running:
         return time.monotonic()
 
     def end(self):
-        """Ends the program as Ctrl-C does; returns its exit code."""
+        """Ends the program as Ctrl-C does, and returns its exit code."""
         self.process.send_signal(signal.SIGCONT)
         self.process.send_signal(signal.SIGINT)
         return self.wait()
 
     def rest(self):
-        """Ends the program; returns all objects that it has printed."""
+        """Ends the program, and returns all objects that it has printed."""
         assert self.end() == 0, self.errors
         return self.left()
 
     def left(self):
-        """Returns all objects that the program has printed, after its end."""
+        """Waits for the end of the output, and returns all objects that the program has printed."""
         while True:
             came, line = self.lines.get()
             if line is None:
@@ -222,10 +222,10 @@ class Running:
 
 
 class Board(Running):
-    """A simulated board. `url` is where it listens, `host_url` the URL by which a host opens it."""
+    """A simulated board. The board listens at `url`. A host opens the board by `host_url`."""
 
     def __init__(self, *urls, options=(), listens=None, **process):
-        """`listens`: the number of places at which it listens, if it differs from the number of URLs."""
+        """`listens`: the number of places at which the board listens. None: the number of URLs."""
         super().__init__('sim', '--json', *urls, *options, **process)
         listening = [self.next(lambda each: each['type'] == 'listening') for _ in range(listens or len(urls))]
         self.url = listening[0]['url']
@@ -239,7 +239,7 @@ class Board(Running):
                          reason in (None, each['reason']), timeout)
 
     def never(self, state, seconds, meanwhile=lambda: None):
-        """Asserts that the board does not reach `state` within `seconds`; calls `meanwhile` repeatedly."""
+        """Asserts that the board does not reach `state` within `seconds`, and calls `meanwhile` repeatedly."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             meanwhile()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Repeats a test that failed while the machine stood still, because links then time out, as they should.
+"""If a test failed while the machine stood still, repeats the test, because links correctly time out at a standstill.
 
 Each repeat is a line in build/results/repeats.txt, which tests/summary.py shows at the end of a run.
 """
@@ -12,7 +12,7 @@ from _pytest.runner import runtestprotocol
 from machine import account
 
 LONGEST_S = 80  # longer tests run in the guest, which repeats its tests one by one
-STANDSTILL_S = 0.2  # machine.py allows for shorter standstills; a link is lost after 0.5 s
+STANDSTILL_S = 0.2  # machine.py allows for shorter standstills, and a link is lost after 0.5 s
 REPEATS = pathlib.Path(__file__).resolve().parents[2] / 'build/results/repeats.txt'
 
 

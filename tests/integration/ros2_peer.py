@@ -125,7 +125,7 @@ class Peer:
         return Payload(found[-1], each['came'])
 
     def endpoint(self, kind, topic, timeout=PATIENCE_S):
-        """Returns the report on a reader or writer of another participant; waits until it exists."""
+        """Returns the report on a reader or writer of another participant, and waits until it exists."""
         if (kind, topic) not in self.endpoints:
             self.next(lambda each: (kind, topic) in self.endpoints, timeout)
         return self.endpoints[kind, topic]
@@ -160,7 +160,7 @@ def armed(*arguments, options=()):
 def join(ros2, peer, topic, of):
     """Makes a publisher of the peer, and waits until both ends have matched it.
 
-    A sample that is written at once may be lost: a DDS reader drops samples that precede the writer's first heartbeat.
+    A sample written at once may be lost, because a DDS reader drops samples before the writer's first heartbeat.
     So a test that writes a sample only once must do so after another sample has arrived.
     """
     peer.writer(f'rt/{topic}', of)
@@ -168,7 +168,7 @@ def join(ros2, peer, topic, of):
 
 
 def arm(ros2, peer):
-    """Presses the button until the board is armed: a sample may be lost, or arrive too late."""
+    """Presses the button until the board is armed, because a sample may be lost or arrive too late."""
     def press():
         for pressed in (b'\x00', b'\x01'):
             peer.write('rt/arm', pressed)
@@ -176,7 +176,7 @@ def arm(ros2, peer):
 
 
 def drive(board, peer, topic, payload, is_it):
-    """Repeats the sample until `is_it` is true for the outputs; returns the time of the last write, and the outputs."""
+    """Repeats the sample until `is_it` is true for the outputs. Returns the time of the last write, and the outputs."""
     written, came = again(lambda: peer.write(topic, payload), lambda timeout: board.outputs(is_it, timeout))
     return written, came['outputs']
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A second implementation of authentication, written from docs/reference/protocol.md: Python's hashlib and a socket.
 
-It shares no code with r4.
+This implementation shares no code with r4.
 """
 import base64
 import hashlib
@@ -44,8 +44,8 @@ class SigningHost:
         self.echo = 0      # T of the newest heartbeat; 0 while the board is connecting
         self.state = {}
         self.refused = []  # (PNum, code)
-        self.reasons = []  # of the heartbeats, in the order of their arrival
-        self.cause = 0  # of the newest heartbeat
+        self.reasons = []  # the reasons in the heartbeats, in the order of their arrival
+        self.cause = 0  # the cause in the newest heartbeat
 
     def close(self):
         self.socket.close()
@@ -65,7 +65,7 @@ class SigningHost:
         return closed(before + tag_of(key or self.key, self.nonce, before) + ';')
 
     def command(self, command, more=''):
-        """Sends a signed command; returns its number and its bytes."""
+        """Sends a signed command, and returns the command's number and bytes."""
         bytes_ = self.signed(self.fields(command, more))
         self.send(bytes_)
         return self.pnum, bytes_
@@ -79,7 +79,7 @@ class SigningHost:
         return bytes_
 
     def echo_of(self, heartbeat):
-        """The T to echo in our next heartbeat: a heartbeat that reports CONNECTING has no T to echo (section 4.2)."""
+        """The T to echo in our next heartbeat. A heartbeat that reports CONNECTING has no T to echo (section 4.2)."""
         connecting = heartbeat['PNum'] == '0' and (heartbeat['T'] == '0' or 'AN' in heartbeat)
         return 0 if connecting else int(heartbeat['T'])
 
@@ -101,7 +101,7 @@ class SigningHost:
             self.state.update(fields)
 
     def run(self, until=lambda: False, seconds=10.0, beats=True):
-        """Keeps the link until `until()` is true; returns False after `seconds`."""
+        """Keeps the link until `until()` is true. After `seconds`, returns False."""
         deadline = time.monotonic() + seconds
         next_beat = 0
         while not until():

@@ -23,7 +23,7 @@ def ip(*arguments):
 
 
 class SlcanBus:
-    """One bus; `interfaces` are its nodes in order."""
+    """One bus. `interfaces` are the nodes in order."""
 
     def __init__(self, nodes=2, bitrate=125000, txqueuelen=1000):
         self.process = subprocess.Popen(
@@ -51,7 +51,7 @@ class SlcanBus:
             fcntl.ioctl(tty, SIOCGIFNAME, name)
             return name.partition(b'\0')[0].decode()
         finally:
-            os.close(tty)  # slcan_bus keeps it open
+            os.close(tty)  # slcan_bus keeps the terminal open
 
     def _read(self):
         for line in self.process.stdout:
@@ -86,7 +86,7 @@ class SlcanBus:
         return self
 
     def __exit__(self, *_):
-        for interface in self.interfaces:  # before slcan_bus ends, because it has to answer the kernel
+        for interface in self.interfaces:  # before slcan_bus ends, because slcan_bus has to answer the kernel
             subprocess.run(['ip', 'link', 'set', interface, 'down'], check=False)
         self.process.stdin.close()
         self.process.wait(PATIENCE_S)

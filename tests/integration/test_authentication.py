@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A board with a key: a second implementation can drive it, and an attacker cannot. r4 with keys."""
+"""A second implementation can drive a board with a key, and an attacker cannot. Also tests r4 with keys."""
 import os
 import pathlib
 import pwd
@@ -32,7 +32,7 @@ def board():
 def host(board):
     it = SigningHost(board.url, 3, KEY)
     it.connect()
-    it.run(seconds=0.15)  # the board has answered the unsigned heartbeat; after this pause it may answer again
+    it.run(seconds=0.15)  # after this pause, the board may answer an unsigned heartbeat again
     yield it
     it.close()
 

@@ -11,7 +11,7 @@ def behind(link, url='udp://127.0.0.1:0'):
 
 
 def suffered(board):
-    """The impairments that the board reports at its end: of its received datagrams, and of its sent datagrams."""
+    """The impairments of the received and of the sent datagrams, as the board reports them."""
     [told] = [each for each in board.rest() if each['type'] == 'impairment']
     return told['received'], told['sent']
 

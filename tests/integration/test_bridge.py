@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 bridge: hosts on one transport, their board on another, as processes."""
+"""r4 bridge as a process, with hosts on one transport and their board on another transport."""
 import signal
 import socket
 import time
@@ -16,7 +16,7 @@ LASTS_S = 2
 
 
 class Bridge(Running):
-    """A running r4 bridge. `url`: where it listens."""
+    """A running r4 bridge. `url`: where the bridge listens."""
 
     def __init__(self, hosts, board, *options):
         super().__init__('bridge', hosts, board, '--json', '--every', '0.1', *options)
@@ -122,7 +122,7 @@ def test_the_board_is_safe_in_time_when_host_or_bridge_is_killed(bridge, board, 
 
 
 def test_a_command_that_waited_in_a_suspended_bridge_is_not_executed(bridge, board):
-    """Uses the paper's client: its heartbeats have no echo, so the board cannot recognise its old datagrams."""
+    """The heartbeats of the paper's client have no echo, so the board cannot recognise the client's old datagrams."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
         address = ('127.0.0.1', int(bridge.url.rsplit(':', 1)[1]))
         client = PaperClient(lambda data: sending.sendto(data, address))

@@ -225,7 +225,7 @@ def test_output_that_cannot_be_written_is_an_error(arguments):
         result = subprocess.run([R4, *arguments], input='AIN:1;^0x1^\n', stdout=full, stderr=subprocess.PIPE,
                                 text=True, check=False)
     assert result.returncode == OPEN
-    lost_errno = 'Input/output error'  # stdio does not keep errno
+    lost_errno = 'Input/output error'  # stdio loses errno
     reason = 'No space left on device' if arguments[0] == 'sim' else f'(No space left on device|{lost_errno})'
     assert re.match(f'r4: standard output: {reason}; ', result.stderr), result.stderr
 
@@ -241,7 +241,7 @@ def test_a_standard_error_that_cannot_be_written_changes_no_exit_code(closed):
 
 
 def test_a_board_does_not_wait_for_the_reader_of_its_log():
-    """No program reads the pipe, which holds 64 KB; each command logs a line or two."""
+    """No program reads the pipe, which holds 64 KB. Each command logs a line or two."""
     with subprocess.Popen([R4, 'sim', 'udp://127.0.0.1:0', '--json', '--duration', '20'],
                           stdout=subprocess.PIPE, text=True) as board:
         url = json.loads(board.stdout.readline())['host_url'] + '?listen=0'

@@ -33,7 +33,7 @@ def happen(board, words):
 
 
 class Script(Running):
-    """r4 commission --json with a program that answers its questions."""
+    """r4 commission --json with a program that answers the questions."""
 
     def __init__(self, board, *options):
         super().__init__('commission', board.host_url, '--json', *options, stdin=subprocess.PIPE)
@@ -132,7 +132,7 @@ class Terminal:
         self.text = ''
 
     def until(self, pattern, typing='', timeout=30):
-        """Reads until the new text matches; meanwhile types, as a held key does."""
+        """Types as a held key does, and reads until the new text matches."""
         deadline = time.monotonic() + timeout
         while not (found := re.search(pattern, self.text)):
             assert time.monotonic() < deadline, f'no {pattern} in {self.text}'

@@ -40,7 +40,7 @@ def a_capture(tmp_path):
 
 
 def convert(source, target, *options, code=0):
-    """Runs r4 convert; returns what it prints."""
+    """Runs r4 convert, and returns the output."""
     result = run('convert', str(source), '-o', str(target), *options)
     assert result.returncode == code, result
     assert not list(target.parent.glob('*.part'))

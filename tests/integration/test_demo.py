@@ -62,13 +62,13 @@ def test_a_killed_demo_leaves_no_board_running():
     while os.path.exists(f'/proc/{child}') and time.monotonic() < deadline:
         with open(f'/proc/{child}/stat', encoding='ascii') as file:
             if file.read().rsplit(')', 1)[1].split()[0] == 'Z':
-                return  # ended, but its parent has not read the exit code
+                return  # the process has ended, but its parent has not read the exit code
         time.sleep(0.02)
     assert not os.path.exists(f'/proc/{child}')
 
 
 def read_screen(master, until, timeout=PATIENCE_S):
-    """Reads the screen until the text `until` is drawn; returns all that was drawn."""
+    """Reads the screen until the text `until` is drawn, and returns all that was drawn."""
     screen = ''
     deadline = time.monotonic() + timeout
     while not re.search(until, screen):
@@ -106,5 +106,5 @@ def test_board_and_monitor_use_little_processor_time_at_100_hz():
         took = time.monotonic() - began
         shares = {name: (each.cpu_seconds() - before[name]) / took for name, each in processes.items()}
     print(f'{300 / took:.0f} Hz; of a core', ', '.join(f'{name} {share:.1%}' for name, share in shares.items()))
-    # 0.5 % on an idle machine (docs/design/benchmarks.md). On a busy machine the same work takes more processor time.
+    # The shares are 0.5 % on an idle machine (docs/design/benchmarks.md). A busy machine needs more processor time.
     assert SANITIZED or max(shares.values()) <= 0.25

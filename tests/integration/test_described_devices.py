@@ -95,7 +95,7 @@ def test_convert_writes_device_values_as_columns_with_units(board, tmp_path):
 
 
 def test_a_recording_includes_the_descriptions_of_its_devices(board, tmp_path):
-    """Also for a user's own description, whose file has been deleted."""
+    """The file of a user's own description is deleted before the recording is read."""
     mine, log, table = tmp_path / 'mine.device', tmp_path / 'drive.r4log', tmp_path / 'drive.csv'
     mine.write_text(MINE)
     devices = ['--device', 'bno055@0x28:1', '--device', f'{mine}@0x40:7']

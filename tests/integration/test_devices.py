@@ -36,7 +36,7 @@ def test_states_contain_polled_readings_until_the_session_ends(board):
     assert newest['I2C2'][2] == 'x5f02' and newest['I2CBUS'] == [0, 0, 0]
     assert sorted(each['t'] - each['fields']['I2C1'][0] for each in states)[-3] <= within_ms(20)
     steps = [after['t'] - before['t'] for before, after in zip(states, states[1:])]
-    # A board on a busy machine leaves states out, which shows in T.
+    # On a busy machine the board leaves states out, which shows in T.
     assert all(step % 10 == 0 for step in steps) and sum(steps) <= within_ms(11 * len(steps)), steps
     after = objects(run('send', board.host_url, 'F:I2C1', '--json', '--hold', '0.1').stdout)
     assert after[0]['confirmed']
@@ -56,7 +56,7 @@ def test_states_report_uart_bytes_voltages_and_inputs(board):
         begin, _, data = each['fields']['UART1']
         data = bytes.fromhex(data[1:])
         position = begin if position is None else position
-        missed = each['pnum'] - earlier['pnum'] > 1  # the monitor missed states, because the machine stood still
+        missed = each['pnum'] - earlier['pnum'] > 1  # the monitor has lost states, because the machine stood still
         assert missed or begin <= position
         text += data[position - begin:]
         position = begin + len(data)

@@ -14,7 +14,7 @@ from r4_process import ERROR, Board, driving, is_link, is_state, monitor, object
 
 USAGE, REFUSED, OPEN = 2, 3, 4
 
-# Answers each question of a search, at the board's port, with the text that its first argument computes.
+# Answers each question of a search, at the board's port, with the text that the first argument computes.
 STRANGER = '''
 import socket, sys, zlib
 def good(fields):
@@ -75,7 +75,7 @@ def test_list_shows_each_board_with_name_url_and_whether_it_is_busy(lan, boards)
     boards('10.77.0.2', 'b-2', '--set', 'name,left')
     boards('10.77.0.3', 'b-3', '--set', 'name,right')
     boards('10.77.0.4', 'b-4')
-    # A program that holds the port of hosts does not prevent other programs from searching.
+    # If a program holds the port of hosts, other programs can search nevertheless.
     with monitor('udp:?id=right', **lan.host.inside) as host:
         host.next(is_link('active'))
         listed = found(lan.host)

@@ -45,7 +45,7 @@ def state(number, damage=0):
 
 
 def asks_to_watch(board):
-    """Waits for the next request to watch, which a host sends twice a second; returns the host's address."""
+    """Waits for the next request to watch, which a host sends twice a second, and returns the host's address."""
     while True:
         bytes_, host = board.recvfrom(2048)
         if bytes_.startswith(b'W:'):
@@ -53,7 +53,7 @@ def asks_to_watch(board):
 
 
 def speak(board):
-    """Sends one state to the host, then many states: each fifth is missing, and each seventh is damaged."""
+    """Sends one state to the host, then many states: each fifth state is missing, and each seventh state is damaged."""
     board.sendto(state(1), asks_to_watch(board))
     host = asks_to_watch(board)
     for number in range(2, 100):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs each command of the documentation and the help that drives a motor: the motor must turn. The simulated
-motors have supply only while relay 1 is closed, as on a real robot."""
+"""Runs each command of the documentation and the help that drives a motor, and asserts that the motor turns. The
+simulated motors have supply only while relay 1 is closed, as on a real robot."""
 import pathlib
 import re
 import subprocess
@@ -17,7 +17,7 @@ DRIVES = re.compile(r'[ODPB]:')
 
 
 def shown_commands():
-    """Yields the commands of each shown `r4 send` that drives a motor; the id names its place."""
+    """Yields the commands of each shown `r4 send` that drives a motor. The id names the page or the help."""
     texts = [(page.name, page.read_text()) for page in PAGES]
     texts += [(f'r4 {" ".join(words)}', run(*words).stdout)
               for words in (['--help'], ['send', '--help'], ['key', '--help'], ['stop', '--help'])]

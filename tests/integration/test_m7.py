@@ -16,7 +16,7 @@ SAFE_WITHIN_MS = 1020
 
 @pytest.fixture(scope='module', name='urls')
 def running_board():
-    """One board for all tests: it runs all the time, as a real board does."""
+    """One board, which runs during all tests, as a real board does."""
     with M7Board() as board:
         yield board
 
@@ -30,8 +30,8 @@ marks = itertools.cycle(['ENC1', 'ENC2'])
 
 
 def states_of(url, count):
-    """Returns `count` states in a row, after the choice of fields. Each call chooses another field, because the board
-    sends the fields that the previous host chose until it receives the choice."""
+    """Returns `count` states in a row, after the choice of fields. Until the board receives the
+    choice, the board sends the fields that the previous host chose, so each call chooses another field."""
     mark = next(marks)
     with monitor(url, '--fields', f'LATE,{mark}') as host:
         host.next(is_link('active'))
@@ -71,7 +71,7 @@ def test_states_report_setpoints_until_the_board_is_stopped(urls):
             stopped = run('stop', urls.udp)
             assert stopped.returncode == 0, stopped
             print(stopped.stdout.splitlines()[0])
-            watcher.ask()  # makes this watcher the newest peer that the board has heard
+            watcher.ask()  # makes this watcher the newest peer from which the board has received
             watcher.next(lambda fields: fields.get('OSMC1') == '0,0' and fields.get('SAFE') == '2')
     assert run('send', urls.serial, 'E:CLEAR').returncode == 0
 

@@ -69,7 +69,7 @@ def test_a_board_is_safe_after_power_on(board):
 
 def test_every_command_sets_its_pins_and_states_report_the_pins(board, link):
     url, listener = link
-    # Opposite signs, because the steppers keep their positions from the run on the other link.
+    # The signs are opposite, because the steppers keep their positions from the run on the other link.
     table = channels(50 if url == board.serial else -50)
     with listener() as others, drive(url, 'F:ALL', *(command for command, *_ in table)):
         for command, is_done, *_ in table:
@@ -113,7 +113,7 @@ def test_every_output_is_safe_soon_after_the_last_byte_of_a_stop(board, link):
         assert run('send', url, 'E:CLEAR').returncode == 0
     took_us.sort()
     print('us from the last byte of E:STOP to the last safe register:', took_us)
-    # A busy machine sometimes delays the emulator; tests/m7/board_test.cpp has the exact bound.
+    # A busy machine sometimes delays the emulator. tests/m7/board_test.cpp has the exact bound.
     assert took_us[len(took_us) // 2] <= 1e6 * within(STOP_WITHIN_US / 1e6)
 
 

@@ -21,7 +21,7 @@ class Metrics(Running):
         self.url = self.next(lambda each: each['type'] == 'listening')['url']
 
     def read(self):
-        """Returns the samples, {(name, the labels except the URL): value}; with several boards {url: samples}."""
+        """Returns the samples, {(name, the labels except the URL): value}, or, with several boards, {url: samples}."""
         with urllib.request.urlopen(self.url, timeout=PATIENCE_S) as answer:
             text = answer.read().decode()
         samples = {}

@@ -28,7 +28,7 @@ def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as host:
         assert host.stdout.readline()
         board.state('ACTIVE')
-        # The test stops reading: the pipe of 64 kB is full after about 250 states, half a second.
+        # The test stops reading. The pipe of 64 kB is full after about 250 states (half a second).
 
         def make_noise():
             for _ in range(10):

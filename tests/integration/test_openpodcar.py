@@ -16,7 +16,7 @@ PROGRAM = os.path.join(os.path.dirname(R4), 'tests', 'openpodcar')
 
 
 class Podcar:
-    """The running program. `typed`: the input in its terminal before it begins."""
+    """The running program. `typed`: the input in the terminal before the program begins."""
 
     def __init__(self, url, typed=b''):
         self.keyboard, terminal = pty.openpty()
@@ -77,7 +77,7 @@ def test_a_restarted_board_still_stops_at_an_obstacle(board):
         podcar.says('press Enter')
         happen(board, 'reboot')  # the restarted board has lost the threshold of US 1
         board.next(lambda each: each.get('happened') == 'reboot')
-        # When the program requests its state fields again, it has detected the restart.
+        # When the program requests its state fields again, the program has detected the restart.
         board.next(lambda each: each.get('executed', {}).get('command', '').startswith('F:'))
         podcar.enter()
         board.next(is_driven)

@@ -3,7 +3,7 @@
 publishes the messages of joy_node and other nodes, and reads /odom.
 
 On a busy machine the joystick may be silent for longer than its timeout. The vehicle then stops, as it must, so the
-tests press start again until it drives."""
+tests press start again until the vehicle drives."""
 import math
 import os
 import queue
@@ -72,7 +72,7 @@ class Scene:
 
     def publish_until(self, is_it, press=False, joystick=True, cmd_vel=None, goal_pose=None, timeout=PATIENCE_S,
                       **buttons):
-        """Repeats the messages until `is_it` is true; collects the new lines of the program in `said`.
+        """Repeats the messages until `is_it` is true, and collects the new lines of the program in `said`.
         `press`: every second message presses start."""
         self.said.clear()
         deadline, start = time.monotonic() + timeout, False
@@ -107,7 +107,7 @@ class Scene:
         assert math.dist(place, (self.odometry.x, self.odometry.y)) < 0.01
 
     def stops(self, why, before, **published):
-        """Asserts that `published` stops the vehicle, which `before` drives. Repeats this after a stop for another reason."""
+        """Asserts that `published` stops the vehicle that `before` drives. If the reason is different, repeats this."""
         deadline = time.monotonic() + 3 * PATIENCE_S
         while True:
             self.drives(**before)

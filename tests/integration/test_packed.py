@@ -74,7 +74,7 @@ def expected(packed):
 
 
 def may_be_masked(text):
-    """True if `r4 decode` may take a part of the text for the value of a setting, which it shows as dots."""
+    """True if `r4 decode` may mistake a part of the text for the value of a setting, which shows as dots."""
     return 'C:' in text
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's Python client, as its section 8.6 describes it, drives the simulated board."""
+"""The paper's Python client, as the paper's section 8.6 describes it, drives the simulated board."""
 import errno
 import socket
 import time
@@ -7,7 +7,7 @@ import time
 from paper_client import PaperClient
 from r4_process import PATIENCE_S, Board
 
-STATES, HEARTBEATS = 300, 5  # the number within three seconds
+STATES, HEARTBEATS = 300, 5  # the numbers within three seconds
 
 
 def test_the_papers_python_client_drives_the_board_without_a_safe_state():
@@ -17,7 +17,7 @@ def test_the_papers_python_client_drives_the_board_without_a_safe_state():
     server_socket.setblocking(False)
     listens_at = server_socket.getsockname()[1]
     with Board(f'udp://127.0.0.1:0?peer=127.0.0.1:{listens_at}') as board:
-        # The board's port comes before the options of its URL.
+        # In the board's URL, the options follow the port.
         address = ('127.0.0.1', int(board.url.split('?')[0].rsplit(':', 1)[1]))
         client = PaperClient(lambda data: client_socket.sendto(data, address))
         deadline = time.monotonic() + 2 * PATIENCE_S

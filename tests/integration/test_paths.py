@@ -52,7 +52,7 @@ def of_two(paths):
 
 
 def carried(paths):
-    """A host process that controls a board; all paths carry."""
+    """A host process that controls a board over paths that all carry."""
     host = monitor('+'.join(path.url for path in paths))
     host.next(is_link('active'))
     for path in paths:
@@ -63,7 +63,7 @@ def carried(paths):
 
 
 def judge(host, began, what):
-    """Asserts that the host has missed no state since `began`."""
+    """Asserts that the host has lost no state since `began`."""
     for _ in range(20):
         host.next(is_state)
     states = [each for each in host.log if is_state(each)]
@@ -160,7 +160,7 @@ def test_each_command_is_executed_once_while_paths_fail_and_recover():
             paths[0].pull()
             sends.until(120)
             paths[0].plug_in()
-            board.next(has_joined(2))  # until then the board has only one path, which must not fail
+            board.next(has_joined(2))  # before this event the board has only one path, which must not fail
             sends.until(190)
             paths[1].signal(signal.SIGSTOP)
             sends.until(260)

@@ -21,7 +21,7 @@ def good(fields):
 
 @pytest.fixture(name='native')
 def a_drive(tmp_path):
-    """Two boards, ten times a second for 4 s; left-arm is stopped from 1 s to 2 s and silent from 2 s to 3.5 s."""
+    """Two boards with ten states a second for 4 s. left-arm is stopped from 1 s to 2 s and silent from 2 s to 3.5 s."""
     lines = ['# r4log 1 by r4 0.1.0', '# path 1 udp://192.168.0.125 left-arm', '# path 2 udp://192.168.0.126 right-arm']
     for i in range(40):
         stopped = 10 <= i < 20

@@ -269,7 +269,7 @@ def test_a_host_reads_a_fresh_state_after_a_pause(board):
             before = host.next(is_state)
         host.stall(0.7)
         first = host.next(is_state)
-        # Longer than the board's timeout: the board goes safe, and the link recovers.
+        # The pause is longer than the board's timeout, so the board goes safe. Then the link recovers.
         host.signal(signal.SIGSTOP)
         board.state('SAFE', 'link')
         host.signal(signal.SIGCONT)
@@ -285,7 +285,7 @@ def test_a_stalled_pipe_does_not_stall_the_heartbeats(path):
                              stderr=subprocess.PIPE, text=True) as host:
         assert host.stdout.readline()
         board.state('ACTIVE')
-        # The test stops reading: the pipe of 64 kB is full after about 250 states, half a second.
+        # The test stops reading. The pipe of 64 kB is full after about 250 states (half a second).
         board.never('SAFE', 1.8)
         host.send_signal(signal.SIGINT)
         host.stdout.read()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 record beside a program that drives, killed, and on a full disk, and r4 info on the result."""
+"""r4 record beside a driving program, after a kill, and on a full disk, and r4 info on the recordings."""
 import contextlib
 import datetime
 import re
@@ -39,7 +39,7 @@ def test_record_includes_commands_of_a_program_on_the_same_path(tmp_path):
     path = tmp_path / 'drive.r4log'
     with Board(f'pty:{tmp_path}/r4') as board, record(board.host_url, '-o', path) as recorder:
         wait_for(path, r'^[0-9.]+ 1< AIN24')
-        # The recorder receives only commands sent after it has connected to the program that holds the path.
+        # The recorder receives only commands sent after the recorder has connected to the program that holds the path.
         commands = [f'O:{pwm},1,1' for pwm in range(319, 359)]
         with driving(board.host_url, *commands) as host:
             wait_for(path, r'^[0-9.]+ 1> H:ROS2-R4')

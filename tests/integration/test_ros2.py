@@ -70,10 +70,10 @@ def test_commands_in_one_text_are_executed_as_a_group(graph):
     join(ros2, peer, 'R4_Command', STRING)
     _, outputs = drive(board, peer, 'rt/R4_Command', text('O:358,1,3; S:1500,2 ;'), lambda each: pwm(each, 3) == 358)
     assert outputs['servo'][1] == pytest.approx(1500, abs=5)
-    peer.write('rt/R4_Command', text('O:100,1,3;O:5000,1,4'))  # one of two commands is invalid: neither is executed
+    peer.write('rt/R4_Command', text('O:100,1,3;O:5000,1,4'))  # one of two is invalid, so neither command is executed
     _, outputs = drive(board, peer, 'rt/R4_Command', text('O:200,0,3'), lambda each: pwm(each, 3) != 358)
     assert pwm(outputs, 3) == -200
-    peer.say('remove', 'rt/R4_Command')  # the outputs that it drove go off
+    peer.say('remove', 'rt/R4_Command')  # the outputs that the publisher drove go off
     outputs = board.outputs(lambda each: pwm(each, 3) == 0)['outputs']
     assert outputs['servo'][1] == 0
 
@@ -106,7 +106,7 @@ def test_outputs_are_commanded_and_reported_in_the_units_of_ros(graph):
 def test_cmd_vel_drives_two_wheels_and_an_invalid_speed_stops_them(graph):
     board, ros2, peer = graph
     join(ros2, peer, 'cmd_vel', TWIST)
-    # The wheels have 0.5 and 1.5 m/s of at most 2 m/s; the right wheel is reversed.
+    # The wheels have 0.5 and 1.5 m/s of at most 2 m/s. The right wheel is reversed.
     _, outputs = drive(board, peer, 'rt/cmd_vel', twist(1.0, 2.0), lambda each: pwm(each, 2) != 0)
     assert pwm(outputs, 1) == 1024 and pwm(outputs, 2) == -3071
     peer.write('rt/cmd_vel', twist(math.nan, 0))
@@ -173,7 +173,7 @@ def test_malformed_samples_change_nothing(graph):
         # Multiples of 4, because shorter samples are padded on the wire.
         bad = [good[:size] for size in range(0, len(good), 4)]
         bad += [good[:-len(text('O:900,1,1'))] + each for each in no_strings if name in ('String', 'AddDiagnostics')]
-        if name == 'AddDiagnostics':  # as rmw_fastrtps sends requests: their identity is not in the payload
+        if name == 'AddDiagnostics':  # the requests of rmw_fastrtps have no identity in the payload
             bad += [text('O:900,1,1'), text('O:900,1,1;' * 9)]
         for payload in bad:
             peer.write(topic, payload)
@@ -182,7 +182,7 @@ def test_malformed_samples_change_nothing(graph):
     peer.write('rt/relay2/command', b'\x02\0')
     for payload in (math.nan, math.inf, -1e30):
         peer.write('rt/osmc1/command', float32(payload))
-    for topic, _ in topics:  # not a sample: it blocks later samples of the same writer, but no other writer
+    for topic, _ in topics:  # this data is not a sample, and blocks later samples of its writer only
         peer.write_raw(topic, b'\0\x01')
         peer.say('remove', topic)
     join(ros2, peer, 'R4_Command', STRING)
@@ -252,7 +252,7 @@ def test_after_a_stop_a_repeated_arm_does_not_arm(graph):
 
 def ask(peer, service, request):
     """Returns the answer of a service: whether the board confirmed, and a text. On a busy machine a request may be too
-    old when it arrives. Then the request is repeated, at most twice."""
+    old when it arrives. Then the test repeats the request, at most twice."""
     for number in range(7, 10):
         peer.write(f'rq/r4/{service}Request', struct.pack('<Qq', CLIENT, number) + request)
         cdr = Cdr(peer.sample(f'rr/r4/{service}Reply'))
@@ -300,7 +300,7 @@ def test_the_service_send_answers_with_the_boards_result(graph):
         confirmed, told = send(wrong)
         assert not confirmed and why in told and told, (wrong, told)
     assert send('Q:ID')[0]
-    # Like any publisher that drives, the client counts as ended after a second of silence: its outputs go off.
+    # After a second of silence, the outputs of the client go off, as for any publisher that drives.
     outputs = board.outputs(lambda each: pwm(each, 3) != 900)['outputs']
     assert pwm(outputs, 3) == 0 and outputs['servo'][1] == 0
     assert send('O:900,1,3')[0]
@@ -346,7 +346,7 @@ def test_the_node_is_listed_for_every_release_of_ros(user_data, gid_size):
         def topics_are_gone():
             return not any('/robot/' in topic for _, topic in peer.endpoints)
         if not topics_are_gone():
-            went = peer.next(lambda _: topics_are_gone(), timeout=8)  # the lease takes 10 s
+            went = peer.next(lambda _: topics_are_gone(), timeout=8)  # the lease lasts 10 s
             assert went['came'] - left < within(0.2)
         peer.next(lambda each: each['type'] == 'participant' and each['gone'], timeout=8)
         assert ros2.wait() == 0
@@ -400,7 +400,7 @@ def test_two_nodes_with_one_name_warn_about_each_other():
                 told = here.logged(f'process {there.process.pid} on ')
                 assert told['level'] == 'warning' and 'has a node /r4, too' in told['text']
                 assert '--namespace' in told['text']
-            for _ in range(2):  # the two messages come in either order
+            for _ in range(2):  # the two messages arrive in either order
                 assert peer.sample('rt/rosout', lambda data: b'has a node /r4, too' in data)[8] == 30
         with Ros2(domain, other.host_url, '--namespace', 'other') as third:
             third.logged('the board is there')
@@ -451,7 +451,7 @@ def test_the_wheel_speeds_example_keeps_the_commanded_speeds():
     drive(0.6)
     assert base.update(speeds, now) == [0, 0]  # without a new command the wheels are off
     assert drive(10, 9.0, 0.0)[0] == pytest.approx(22.5, rel=0.02)  # the highest speed
-    assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # it recovers from saturation
+    assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # the controller recovers from saturation
     base.command(1, 0, now)
     assert base.update((math.nan, 0), now) == [0, 0]
 

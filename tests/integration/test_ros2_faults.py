@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2, when it or another participant in its graph is killed, pauses or is late."""
+"""Kills, pauses or delays r4 ros2 or another participant in its graph."""
 import signal
 import time
 

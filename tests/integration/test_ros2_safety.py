@@ -19,7 +19,7 @@ def newest_outputs(board):
 
 
 def test_a_zero_published_once_arrives_over_a_link_with_loss():
-    # Without a deadline only the command can end the drive. Without repetition, about a third of the ten would be lost.
+    # Without a deadline only the command can end the drive. Without repetition, a third of the commands would be lost.
     with armed('--deadline', '0', options=('--link', 'loss=30%,seed=7')) as (board, ros2, peer):
         join(ros2, peer, 'osmc1/command', FLOAT32)
         for _ in range(10):
@@ -45,7 +45,7 @@ def test_an_arm_published_before_a_stop_does_not_undo_the_stop(_):
         drive(board, peer, 'rt/osmc1/command', float32(0.25), lambda each: pwm(each, 1) == 1024)
         peer.write('rt/arm', OFF)
         peer.write('rt/arm', ON)
-        peer.write('rt/stop', ON)  # if both samples come in the same turn, the node takes the stop first
+        peer.write('rt/stop', ON)  # if both samples arrive in the same turn, the node takes the stop first
         ros2.logged('E:STOP: confirmed')
         again(lambda: peer.write('rt/osmc1/command', float32(0.5)),
               lambda timeout: ros2.logged('not armed (stop)', timeout=timeout))

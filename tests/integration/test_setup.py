@@ -18,7 +18,7 @@ UNIT_TESTS = {'libgtest-dev', 'librapidcheck-dev', 'libbenchmark-dev', 'python3'
 
 
 class Release:
-    """A simulated system with some packages installed and some in its archive: its programs are first in PATH."""
+    """A simulated system with some packages installed and some in its archive. Its programs are first in PATH."""
 
     def __init__(self, folder, archive, installed=(), version='9.0'):
         self._log = folder / 'installed'
@@ -41,7 +41,7 @@ class Release:
         path.chmod(0o755)
 
     def set_up(self, *options, **variables):
-        """Runs tools/setup; returns the run and the packages that it would have installed."""
+        """Runs tools/setup, and returns the run and the packages that tools/setup would have installed."""
         ended = subprocess.run([TOOLS / 'setup', *options], capture_output=True, text=True, check=False,
                                env={**os.environ, 'PATH': f'{self._path}:/usr/bin:/bin', **variables})
         said = self._log.read_text() if self._log.exists() else ''
@@ -131,7 +131,7 @@ class Table:
         program.chmod(0o755)
 
     def run(self, *words):
-        """Runs the table; returns the run and the logged commands."""
+        """Runs the table, and returns the run and the logged commands."""
         ended = subprocess.run([self.folder / 'tools/on.d/table', *words], capture_output=True, text=True, check=False,
                                env={**os.environ, 'R4_ON_DIR': str(self.folder / 'roots')})
         return ended, (self.folder / 'commands').read_text().splitlines()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Programs that share a transport: one user runs them in several terminals, on the same URL."""
+"""Programs that share a transport: one user runs the programs in several terminals, on the same URL."""
 import contextlib
 import itertools
 import os
@@ -18,7 +18,7 @@ from machine import within
 from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, free_port, is_state, objects, run, stop_takes_ms,
                         wait_for, watch)
 
-# Another program takes a path over within 100 ms; the bound is double for a busy machine.
+# Another program takes a path over within 100 ms. For a busy machine, the bound is double.
 TAKEN_OVER_WITHIN_S = 0.2
 
 
@@ -129,7 +129,7 @@ def test_recorders_lose_no_datagram_when_watchers_hang_or_are_killed(board, fold
 
 
 def with_a_stopped_holder(url, look, watchers=2):
-    """Stops a watcher that holds the transport, with other watchers beside it; calls `look` for each other watcher."""
+    """Stops a watcher that holds the transport, beside other watchers, and calls `look` for each other watcher."""
     with watch(url) as holder, contextlib.ExitStack() as running:
         holder.next(is_state)
         others = [running.enter_context(watch(url)) for _ in range(watchers)]
@@ -158,7 +158,7 @@ def test_a_suspended_holder_of_the_only_port_is_named():
 
 
 def test_a_suspended_watching_holder_does_not_block_a_board(folder):
-    # Only one program can open a serial port, so only one watcher takes it over from the stopped program.
+    # Only one program can open a serial port, so only one watcher takes the port over from the stopped program.
     for url, watchers in ('udp://127.0.0.1:0', 2), (f'pty:{folder}/tty', 1):
         with Board(url) as board:
             with_a_stopped_holder(board.host_url.removesuffix('?listen=0'), hears_on, watchers)

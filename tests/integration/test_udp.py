@@ -25,7 +25,7 @@ def port_of(board):
 def flood(board, rate_hz, datagrams, at_once=0, places=0):
     """Sends `datagrams` to the board during the block: `at_once` at the start, then `rate_hz` per second.
 
-    `places`: the number of ports that send in turn; 0: a new port for each datagram. Yields the list of send times.
+    `places`: the number of ports that send in turn. 0: a new port for each datagram. Yields the list of send times.
     """
     sent = []
     end = threading.Event()
@@ -56,7 +56,7 @@ def flood(board, rate_hz, datagrams, at_once=0, places=0):
 
 
 def stays_with_its_host_in(board, flooded):
-    """The controlling host keeps control during the flood; the next host gets control after the first host has left."""
+    """The controlling host keeps control during the flood. The next host gets control after the first host has left."""
     with monitor(board.host_url) as host:
         host.next(is_link('active'))
         board.state('ACTIVE')
@@ -101,10 +101,10 @@ def test_streams_its_state_at_100_hz(board):
     times = [each['t'] for each in states]
     steps = [later - earlier for earlier, later in zip(times, times[1:])]
     print(f'{len(states)} states in {times[-1] - times[0]} ms of the board')
-    # Heartbeats (two per second) and answers about the board's clock use the same numbers. At first ten answers come per
-    # second; on a busy machine the clock is uncertain for longer, so the answers continue.
+    # Heartbeats (two per second) and answers about the board's clock use the same numbers. At first the board sends ten
+    # answers per second. On a busy machine the clock is uncertain for longer, so the answers continue.
     assert len(states) - 1 <= numbers[-1] - numbers[0] <= len(states) + 4 + 20
-    # T stays in the grid of 10 ms; a busy machine may leave periods out, but never shifts the grid.
+    # T stays in the grid of 10 ms. A busy machine may leave periods out, but never shifts the grid.
     assert all(step % 10 == 0 for step in steps)
     assert times[-1] - times[0] <= within_ms(11 * len(steps))
     assert states[0]['fields']['AIN24'] == pytest.approx(24.3, abs=1)
@@ -144,7 +144,7 @@ def test_the_commands_of_a_group_are_executed_together_or_not_at_all(board):
     assert first['outputs']['osmc'] == [[358, 1], [358, 1], [358, 0], [358, 0]], 'the group was not executed at once'
     result = run('send', board.host_url, 'O:1,1,1;O:1,1,2')
     assert result.returncode == 3 and 'none of the 2 commands was executed' in result.stderr, result
-    # The board itself checks groups, because other programs may not.
+    # The board itself checks groups, because other programs may not check groups.
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.settimeout(PATIENCE_S)
         for fields, answer in (('O:1,1,1;O:1,1,5', 'N:5,CHANNEL;AT:2;'), ('O:1,1,1;C:rate,9', 'N:5,FORMAT;AT:2;')):
@@ -205,7 +205,7 @@ def test_the_board_is_safe_in_time_after_its_host_is_killed(board):
         killed = host.signal(signal.SIGKILL)
         off = board.outputs(lambda outputs: outputs['osmc'][0] == [0, 0])
         safe = board.state('SAFE', 'link')
-    # The guard switches off on the millisecond; the board's loop reports it in its next turn.
+    # The guard switches the outputs off on the millisecond. The board's loop reports this in its next turn.
     off_after = safe['silence'] - (safe['t'] - off['t']) % 2**32
     print(f"off {off_after} and said {safe['silence']} ms after the last heartbeat, "
           f"{(safe['came'] - killed) * 1000:.0f} ms after the kill")
@@ -215,7 +215,7 @@ def test_the_board_is_safe_in_time_after_its_host_is_killed(board):
 
 
 def test_a_heartbeat_counts_from_its_arrival_at_a_suspended_board():
-    # A host as in the paper: its heartbeats have no echo, so the board can only count from their arrival.
+    # The heartbeats of a host as in the paper have no echo, so the board can only measure from their arrival.
     with Board('udp://127.0.0.1:0', options=('--set', 'timeout,2000')) as board, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
         host.connect(('127.0.0.1', int(board.url.rsplit(':', 1)[1])))
@@ -237,7 +237,7 @@ def test_a_heartbeat_counts_from_its_arrival_at_a_suspended_board():
         safe = board.state('SAFE', 'link')
     after_ms = (safe['came'] - delivered) * 1000
     print(f'SAFE {after_ms:.0f} ms after the heartbeat was delivered')
-    assert 1200 < after_ms <= within_ms(2020)  # longer than 1000, so the last heartbeat counted
+    assert 1200 < after_ms <= within_ms(2020)  # longer than 1000, so the board measured from the last heartbeat
 
 
 def test_control_is_free_after_the_controlling_host_is_killed(board):
@@ -356,13 +356,13 @@ def test_the_same_seed_gives_the_same_start_time():
                 host.wait()
             assert 'board left,' in run('send', board.host_url, 'Q:ID').stdout
         boots.append(boot['t'])
-    # The seed chooses one of 2^32 start times; the difference is the time until the report.
+    # The seed chooses one of 2^32 start times. The difference is the time until the report.
     assert abs(boots[0] - boots[1]) < 1000
 
 
 def test_the_events_of_a_scenario_happen_to_the_board(tmp_path):
     script = tmp_path / 'scenario'
-    slow = 5 if SANITIZED else 1  # in s; the host has connected before the first line
+    slow = 5 if SANITIZED else 1  # in s, so that the host connects before the first line
     script.write_text(f'{slow} handle released\n{1.5 * slow} handle held\n{2 * slow} fault\n')
     with Board('udp://127.0.0.1:0', options=['--script', str(script)]) as board:
         with monitor(board.host_url) as host:

@@ -17,7 +17,7 @@ import pytest
 
 from r4_process import ERROR, R4, Board, objects, run
 
-# Reports the boot loader from the N-th call with -l on; the file `there` has N. Writes the bit rate of the port to `speed`.
+# From the N-th call with -l, reports the boot loader. The file `there` has N. Writes the port's bit rate to `speed`.
 DFU_UTIL = '''#!/bin/bash
 echo "$*" >>"$R4_TEST_DFU/calls"
 case "$*" in

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The serial transport on a USB serial port with its real driver, in the guest of tools/with-can.
 
-The board at the far end of the cable is simulated, outside of the guest. usb_serial_inside.py runs in the guest. Its
-input and output are another path to the board.
+The board at the far end of the cable is simulated, outside of the guest. usb_serial_inside.py runs in the guest. The
+input and output of this program are another path to the board.
 """
 import json
 import os

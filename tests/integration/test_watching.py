@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Programs that watch a board: beside a program that drives it, in either order of start, and alone."""
+"""Programs that watch a board, alone or beside a driving program, in either order of start."""
 import itertools
 import re
 import signal
@@ -51,7 +51,7 @@ def test_monitor_and_send_work_in_either_order(board):
 
 
 def test_the_first_steps_of_the_help_work_as_printed():
-    """Uses the two ports of the protocol, on a computer where no other program has them."""
+    """Uses the two ports of the protocol, on a computer where no other program uses these ports."""
     with Lan() as lan:
         inside = lan.computer('10.77.0.1').inside
         with Board('udp://127.0.0.1', **inside):

@@ -379,7 +379,7 @@ def test_a_slow_browser_loses_old_states_and_uses_little_memory():
         states = page.states(150)
         assert states[-1]['time'] - states[0]['time'] < within_ms(2000)
         assert web.resident_kib() - before < 2048 or not PROMPT, (before, web.resident_kib())
-        # First come the old states in the kernel's buffer, then the report of lost states, then new states.
+        # The first messages are the old states in the kernel's buffer, then the report of lost states, then new states.
         lost = False
         while True:
             message = json.loads(slow.receive()[1])
@@ -399,8 +399,8 @@ def test_a_client_with_an_unfinished_request_is_disconnected():
 
 
 def test_hostile_clients_do_not_disturb_the_controlling_page():
-    """A busy machine may delay the page or r4 web for long enough to lose the board. Another attempt is allowed only
-    if r4 web itself used little of a processor: then the attack was not the cause."""
+    """A busy machine may delay the page or r4 web for long enough to lose the board. If r4 web
+    itself used little of a processor, the attack was not the cause, and another attempt is allowed."""
     seed = os.environ.get('R4_SEED', '1')
     with one_board() as (board, web), Page(web) as page:
         before, undisturbed = web.resident_kib(), False

@@ -15,7 +15,7 @@ from r4_process import Board, objects, run
 from web_client import Web
 
 RESULTS = pathlib.Path(__file__).resolve().parents[2] / 'build/results/web'
-# An idle machine takes a third of this.
+# An idle machine needs a third of this time.
 FIRST_PLOT_MS = 3000
 ON_SCREEN_MS = 250
 STOP_MS = 100
@@ -62,14 +62,14 @@ def ask_for_control(page):
 
 
 def take_control(page):
-    """Takes control, unless the page has it."""
+    """If the page does not have control, takes control."""
     if not page.evaluate(IN_CONTROL):
         does(page, lambda: ask_for_control(page), IN_CONTROL)
         page.until(f'!{IN_CONTROL} || document.querySelector("#holder").textContent.startsWith("You control")')
 
 
 def press(page, button):
-    """Presses a button of the card, and returns the board's answer, or '' if control was lost before it."""
+    """Presses a button of the card, and returns the board's answer, or '' if control was lost before the answer."""
     page.evaluate('document.querySelector(".card output").textContent = ""')
     page.click(button)
     return page.until('(({textContent: told}) => told.length > 1 ? told : '
@@ -77,7 +77,7 @@ def press(page, button):
 
 
 def arm(page):
-    """Arms the board; takes control first if the page does not have it."""
+    """If the page does not have control, takes control. Then arms the board."""
     def ask():
         take_control(page)
         if 'press Clear' in press(page, ARM):  # the latched stop is older than this control
@@ -95,7 +95,7 @@ def drives(page, act, shows):
 
 
 def type_in(page, value):
-    """Types the value; uses only the keyboard once the number field has the focus."""
+    """Gives the number field the focus, then uses only the keyboard."""
     page.focus(f'{OSMC1} input[type=number]')
     page.do('click', selector=f'{OSMC1} input[type=number]', count=3)
     page.do('type', text=value)
@@ -144,7 +144,7 @@ def test_plots_can_be_paused_zoomed_and_read(browser):
         page.until_text('#pause', 'Go on')
         before = page.evaluate(PICTURES)
         seen = page.evaluate('r4_measured.states')
-        page.until(f'r4_measured.states > {seen} + 20')  # the paused page keeps the new states
+        page.until(f'r4_measured.states > {seen} + 20')  # the paused page stores the new states
         assert page.evaluate(PICTURES) == before
         page.click('#zoom-in')
         page.until(f'{PICTURES} !== {before!r}')
@@ -213,7 +213,7 @@ def test_commands_by_mouse_and_by_keyboard_are_confirmed_by_the_board(browser):
             page.focus('[data-channel=servo2] input[type=range]')
             page.press('PageUp')
         drives(page, key_up, 'Number(document.querySelector("[data-channel=servo2] .reported").textContent) > 0')
-        drives(page, lambda: page.click(f'{OSMC1} .choice'), is_confirmed('osmc1'))  # it stops before it reverses
+        drives(page, lambda: page.click(f'{OSMC1} .choice'), is_confirmed('osmc1'))  # the motor stops before reversing
         board.executed('O:0,0,1')
 
         def switch_off():

@@ -25,7 +25,7 @@ TSHARK = ['tshark'] if os.geteuid() != 0 else [
 
 
 def tshark(*arguments, plugin=True, **options):
-    """Runs tshark; returns the lines that it prints."""
+    """Runs tshark, and returns the lines that tshark prints."""
     load = ['-X', f'lua_script:{DISSECTOR}/r4.lua'] if plugin else []
     result = subprocess.run([*TSHARK, *load, *map(str, arguments)], capture_output=True, check=False, **options)
     output, errors = result.stdout.decode('utf-8', 'replace'), result.stderr.decode('utf-8', 'replace')
@@ -42,7 +42,7 @@ def fields(path, *names, only=None, options=()):
 
 
 def write_pcap(path, link_type, packets):
-    """`packets`: (seconds, bytes) of each."""
+    """`packets`: (seconds, bytes) of each packet."""
     with open(path, 'wb') as file:
         file.write(struct.pack('<IHHiIII', 0xA1B2C3D4, 2, 4, 0, 0, 65535, link_type))
         for seconds, packet in packets:
@@ -255,7 +255,7 @@ def test_fields_and_units_match_those_of_r4_convert(shown, tmp_path):
 
 
 def test_commands_are_those_of_r4_send(shown, tmp_path):
-    # A word, as in E:STOP, is a separate value; the values of X have no names.
+    # A word, as in E:STOP, is a separate value. The values of X have no names.
     forms = re.findall(r'^  ([A-WYZ]):(?:[A-Z]{2,})?(\S*) ', run('send', '--help').stdout, re.MULTILINE)
     assert len(forms) >= 12
     for letter, form in forms:

@@ -129,7 +129,7 @@ def pty_of_a_board(tmp_path):
 
 
 def test_a_given_wiring_is_used_from_the_next_start_on_in_every_channel(other, cable):
-    """A new board whose wiring differs from the plan in thirty places: no recompilation, one restart."""
+    """A new board, whose wiring differs from the plan in thirty places, needs one restart and no recompilation."""
     assert len(OTHER) >= 30
     pty, serial = cable
     with Board(pty, 'udp://127.0.0.1:0', listens=2, options=['--wired', other, '--new', '--stdin'],

@@ -32,7 +32,7 @@ def children(pid):
 
 
 def await_guest(process):
-    """Returns the process id of QEMU as soon as QEMU runs; the guest need not have booted."""
+    """Returns the process id of QEMU as soon as QEMU runs, even if the guest has not booted."""
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         for pid in children(process.pid):

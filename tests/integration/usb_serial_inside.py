@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The part of test_usb_serial.py that runs inside the guest; fails by an exception.
+"""The part of test_usb_serial.py that runs inside the guest. A failure is an exception.
 
 The USB serial port is real for the kernel's driver, sysfs and libserialport. Our standard input and output are
 another path to the same board, so messages go to standard error.
@@ -61,7 +61,7 @@ def is_down(each):
 
 
 def listed(*options):
-    """The port in r4 list. With `--serial`, r4 queries the board at the port, although its USB id is not a board's."""
+    """The port in r4 list. With `--serial`, r4 queries the board, although the port's USB id is not a board's."""
     ports = [each for each in objects(run('list', '--json', *options).stdout) if each['type'] == 'port']
     port = next(each for each in ports if each['path'] == PORT)
     assert (port['usb'], port['serial_number']) == ('0403:6001', 'R4-0001'), port
@@ -85,7 +85,7 @@ def streams_at_the_boards_rate():
         host.next(is_state)
         rate = subprocess.run(['stty', '-F', PORT, 'speed'], capture_output=True, text=True,
                               check=False)
-        # Only root can open the port while r4 has it.
+        # While r4 has the port, only root can open the port.
         assert rate.stdout == '1000000\n' if os.geteuid() == 0 else 'busy' in rate.stderr, rate
         states = [host.next(is_state) for _ in range(200)]
         assert host.end() == 0

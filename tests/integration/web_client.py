@@ -45,7 +45,7 @@ class Web(Running):
 
 
 class Refused(Exception):
-    """The server refused the handshake; `status` is the status of its answer."""
+    """The server refused the handshake. `status` is the status of the answer."""
 
     def __init__(self, status):
         super().__init__(f'the handshake was refused: {status}')
@@ -122,7 +122,7 @@ class WebSocket:
 
 
 class Page(WebSocket):
-    """Acts as the page of r4 web: it reads all the time. `newest`: the newest time that it has received."""
+    """Acts as the page of r4 web: the page reads all the time. `newest`: the newest time that the page has received."""
 
     def __init__(self, web, **options):
         super().__init__(web.port, **options)
@@ -161,7 +161,7 @@ class Page(WebSocket):
                 self._news.notify_all()
 
     def next(self, kind, is_it=lambda each: True, timeout=PATIENCE_S):
-        """Returns the next message of that type for which `is_it` is true; drops the messages before it."""
+        """Returns the next message of that type for which `is_it` is true. Drops the earlier messages."""
         deadline = time.monotonic() + timeout
         with self._news:
             while True:

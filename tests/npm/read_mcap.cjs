@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads an MCAP file by npm's @mcap/core, from its beginning and by its indexes. Both readings must agree, and every
-// checksum, offset and count must be right. Prints a JSON object: its topics, and its messages in the order of the file
+// checksum, offset and count must be right. Prints a JSON object: the topics, and the messages in the order of the file
 // as [topic, microseconds, object].
 'use strict';
 const assert = require('node:assert/strict');

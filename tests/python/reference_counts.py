@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Uses the package repeatedly, on an interpreter that counts all references. Exit code 1 if their number grows. Leaves
-out r4link.read(), because numpy is not built for this interpreter, so its references are not counted."""
+out r4link.read(), because numpy is not built for this interpreter, which does not count the references of numpy."""
 import gc
 import os
 import sys

@@ -25,7 +25,7 @@ def is_public(path, names):
 
 
 def is_overload(function):
-    """True for the signature of one way to call a function. The function itself follows, with its docstring."""
+    """True if `function` is the signature of one way to call a function. The function follows, with its docstring."""
     return 'overload' in map(ast.unparse, function.decorator_list)
 
 

@@ -89,7 +89,7 @@ def test_a_board_is_closed_in_a_forked_process(board):
 
 
 def in_a_fork(action):
-    """Returns the exit code of a forked child that runs `action`; ends a child that hangs."""
+    """Returns the exit code of a forked child that runs `action`, and ends a child that hangs."""
     child = os.fork()
     if child == 0:
         signal.alarm(20)
@@ -216,7 +216,7 @@ def test_waiting_calls_end_when_another_thread_closes_the_board():
     threads = [threading.Thread(target=call, args=(each,)) for each in calls]
     for each in threads:
         each.start()
-    time.sleep(0.05)  # most threads then wait; other threads end in the same way
+    time.sleep(0.05)  # most threads wait after this time, and the other threads end in the same way
     board.close()
     for each in threads:
         each.join(10)

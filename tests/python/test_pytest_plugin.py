@@ -37,7 +37,7 @@ def written(*names):
 
 
 def run_step(step, folder, *files):
-    """Runs a step of the example's workflow; `files`: only these tests. Asserts that no test is skipped."""
+    """Runs a step of the example's workflow, and asserts that no test is skipped. `files`: runs only these tests."""
     project = shutil.copytree(EXAMPLE, folder / 'project')
     env = {**os.environ, 'R4LINK': str(ROOT), 'PATH': f'{pathlib.Path(sys.executable).parent}:{os.environ["PATH"]}',
            'PYTHONPATH': f'{ROOT / "tests/integration"}:{os.environ["PYTHONPATH"]}',

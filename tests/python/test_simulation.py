@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4link.SimBoard: events around a simulated board, in this process and in a separate one."""
+"""r4link.SimBoard: events around a simulated board, in this process and in a separate process."""
 import pathlib
 import re
 import subprocess

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The stack that functions need with all functions that they call, from the output of GCC with -fcallgraph-info=su.
 
-GCC does not list the functions that are called through an interface. Rules list them: (caller, classes, functions),
-regular expressions over mangled names. A caller without a rule is an error, so no call is left out.
+GCC does not list the functions that are called through an interface. Rules list these functions: (caller, classes,
+functions), regular expressions over mangled names. A caller without a rule is an error, so no call is left out.
 """
 import re
 

@@ -5,7 +5,7 @@
     relay.py pty LINK DEVICE  from a new pty, to which LINK points, to the pty of the board
 
 If the process is killed, the path is unplugged. The system reports this at once for a pty, and never for UDP.
-While the process is stopped (SIGSTOP), the path delivers nothing; when it continues, it delivers old datagrams.
+While the process is stopped (SIGSTOP), the path delivers nothing. When the process resumes, it delivers old datagrams.
 Prints the URL for a host as soon as the path works.
 """
 import os

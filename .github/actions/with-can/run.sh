@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Runs the commands in WITH_CAN_RUN, on Debian or Ubuntu. Makes vcan0 if this kernel supports it, else installs the
-# packages for the guest. WITH_CAN_OPTIONS has the options of tools/with-can.
+# Runs the commands in WITH_CAN_RUN, on Debian or Ubuntu. If this kernel supports vcan0, makes it, else installs
+# the packages for the guest. WITH_CAN_OPTIONS has the options of tools/with-can.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
 as_root=()
