@@ -30,7 +30,6 @@ Board::Board(const std::vector<CarrierMaker>& makers, BoardOptions options,
     : impl_(Impl::started(
           [&makers](Loop& loop) {
             std::vector<std::unique_ptr<Carrier>> carriers;
-            carriers.reserve(makers.size());
             for (const CarrierMaker& make : makers) carriers.push_back(make(loop));
             return carriers;
           },
@@ -74,7 +73,7 @@ void Board::wait_active(Duration timeout) {
     const LinkStatus& link = impl->link;
     if (link.cannot_begin()) return true;
     if (impl->async.role() == BoardRole::watch) return is_heard(link.state);
-    return link.state == HostLinkState::active && impl->in_control && !link.gated();
+    return link.state == HostLinkState::active && link.in_control && !link.gated();
   });
   const LinkStatus link = impl->read(impl->link);
   if (link.cannot_begin()) throw Error(explain(paths()));
@@ -83,8 +82,9 @@ void Board::wait_active(Duration timeout) {
 
 void Board::send(const Command& command, Duration timeout) {
   const auto impl = impl_;
-  if (command.kind == CommandKind::stop && timeout.count() <= 0) impl->post(command);
-  impl->execute(command, timeout);
+  // A stop is sent even without a timeout.
+  if (command.kind == CommandKind::stop && timeout.count() <= 0) post(command);
+  impl->execute(OwnCommand(command), timeout);
 }
 void Board::send(const Setpoints& setpoints, Duration timeout) {
   const auto impl = impl_;
@@ -93,21 +93,21 @@ void Board::send(const Setpoints& setpoints, Duration timeout) {
 void Board::send(std::string_view text, Duration timeout) {
   std::visit([&](const auto& each) { send(each, timeout); }, parse_text(text));
 }
-PostResult Board::post(const Command& command) { return impl_->post(command); }
+PostResult Board::post(const Command& command) { return impl_->post(OwnCommand(command)); }
 PostResult Board::post(const Setpoints& setpoints) { return impl_->post(setpoints); }
 void Board::arm(Duration timeout) {
   require_timeout("arm()", timeout);
+  require_control(role(), "arm()");
   const auto impl = impl_;
-  impl->require_control("arm()");
   const auto arm = [](AsyncBoard& board, std::size_t, Duration left, auto end) {
     board.async_arm(left, std::move(end));
   };
-  impl->execute("arm()", arm, timeout);
+  confirmed("arm()", impl->run("arm()", arm, timeout));
 }
 DisarmCause Board::disarmed_by() const { return impl_->read(impl_->disarmed_by); }
 
 void Board::stop(Duration timeout) { send(Command::stop(), timeout); }
-void Board::stop_async() { impl_->post(Command::stop()); }
+void Board::stop_async() { post(Command::stop()); }
 
 Command Board::DriveChannel::command(Pwm pwm, Direction direction) const {
   return kind_ == CommandKind::osmc ? Command::osmc(channel_, pwm, direction)
@@ -187,24 +187,24 @@ void Board::link_timing(Duration board_timeout, Duration heartbeat, Duration tim
   const std::string text = "C:timeout," + std::to_string(board_timeout.count()) + " C:heartbeat," +
                            std::to_string(heartbeat.count());
   require_timeout(text, timeout);
+  require_control(role(), text);
   const auto impl = impl_;
-  impl->require_control(text);
   impl->async.require_link_timing(board_timeout, heartbeat);
   const auto set = [=](AsyncBoard& board, std::size_t, Duration left, auto end) {
     board.async_link_timing(board_timeout, heartbeat, left, std::move(end));
   };
-  impl->execute(text, set, timeout);
+  confirmed(text, impl->run(text, set, timeout));
 }
 
 BoardIdentity Board::identify(Duration timeout) {
   const auto impl = impl_;
-  impl->execute(Command::identify(), timeout);
+  impl->execute(OwnCommand(Command::identify()), timeout);
   return impl->read(impl->identity);
 }
 
 BoardWiring Board::wiring(Duration timeout) {
   const auto impl = impl_;
-  impl->execute(Command::ask_wiring(), timeout);
+  impl->execute(OwnCommand(Command::ask_wiring()), timeout);
   return impl->read(impl->identity).wiring.value();
 }
 

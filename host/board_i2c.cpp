@@ -48,16 +48,13 @@ void Board::I2c::poll_off(int slot, Duration timeout) const {
 Board::I2c::Bytes Board::I2c::transfer(const Command& command, Duration timeout) const {
   const auto impl = board_.impl_;
   const std::string text = shown(command);
-  impl->require_sendable(command);
+  impl->require_sendable(OwnCommand(command));
   require_timeout(text, timeout);
   const auto start = [own = OwnCommand(command)](AsyncBoard& board, std::size_t, Duration left,
                                                  auto end) {
     board.async_transfer(own, left, std::move(end));
   };
-  const auto part = impl->run(text, start, timeout);
-  if (part->result.outcome != Outcome::confirmed) {
-    throw Error(explain(command, part->result, part->link));
-  }
+  const auto part = confirmed(command, impl->run(text, start, timeout));
   const auto& bytes = part->result.transfer.data;
   return {bytes.begin(), bytes.end()};
 }
@@ -65,15 +62,13 @@ Board::I2c::Bytes Board::I2c::transfer(const Command& command, Duration timeout)
 void Board::attach(const Device& device, Duration timeout) {
   const std::string text = device.text();
   require_timeout(text, timeout);
+  require_control(role(), text);
   const auto impl = impl_;
-  impl->require_control(text);
-  const Duration each = Impl::bounded(timeout);
+  const Duration each = bounded(timeout);
   const auto attach = [device, each](AsyncBoard& board, std::size_t, Duration, auto end) {
     board.async_attach(device, each, std::move(end));
   };
-  const auto part = impl->run(text, attach, longest(device, each));
-  if (part->result.outcome == Outcome::confirmed) return;
-  throw Error(explain(device, part->result, part->link));
+  confirmed(device, impl->run(text, attach, longest(device, each)));
 }
 
 }  // namespace r4

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <asio/post.hpp>
 #include <utility>
 
@@ -14,27 +13,18 @@
 
 namespace r4 {
 
-namespace {
-
-template <class What, class Part>
-Part confirmed(const What& what, Part part) {
-  if (part->result.outcome == Outcome::confirmed) return part;
-  throw Error(explain(what, part->result, part->link));
-}
-
-}  // namespace
-
 Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first)
     : BlockingLoop({"board", "a transport of your own must return at once"}, 1,
                    std::move(options.on_wait)),
       arming(options.session.arming),
       callback_limit(options.callback_limit),
       async(io, make(loop), options),
-      box(io,
-          [this](const PostBox::Letter& letter) {
-            std::visit([this](const auto& what) { deliver(what); }, letter);
-          }),
-      callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
+      box(io, [this](const CommandOrGroup& letter) { deliver(letter); }),
+      callbacks([this](Clock::duration busy) { on_callback_end(busy); },
+                [this](int channel) {
+                  const std::lock_guard lock(mutex);
+                  return std::exchange(uarts[channel - 1].to_report, {});
+                }) {
   require_callback_limit(callback_limit);
   callbacks.add<ReceivedState>(std::move(first.on_state));
   callbacks.add<LinkStatus>(std::move(first.on_link));
@@ -43,10 +33,6 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
   callbacks.add_restart(std::move(first.on_restart));
   callbacks.add<DisarmCause>(std::move(first.on_arming));
   callbacks.add<RefusedPost>(std::move(first.on_refused));
-  callbacks.take_uart([this](int channel) {
-    const std::lock_guard lock(mutex);
-    return std::exchange(uarts[channel - 1].to_report, {});
-  });
   listen();
   async.open();
   take_name();
@@ -58,25 +44,21 @@ std::shared_ptr<Board::Impl> Board::Impl::started(const CarriersMaker& make, Boa
   return with_system_errors("a board", [&] {
     require_watches();
     auto impl = std::make_shared<Impl>(make, std::move(options), std::move(first));
-    impl->start();
+    impl->callbacks.start(impl);
+    try {
+      impl->start([impl] { impl->io.run(); });
+    } catch (...) {
+      impl->callbacks.stop();
+      throw;
+    }
     return impl;
   });
 }
 
-void Board::Impl::start() {
-  callbacks.start(shared_from_this());
-  try {
-    BlockingLoop::start([self = shared_from_this()] { self->io.run(); });
-  } catch (...) {
-    callbacks.stop();
-    throw;
-  }
-}
-
 // Ends the loop before the callbacks: the loop does not wait, so a callback may close the board.
 void Board::Impl::close() {
-  BlockingLoop::close([this] { shut(); });
-  keep(nullptr);  // after shut(), so that the farewell is recorded
+  BlockingLoop::close({&async});
+  keep(nullptr);  // after the loop, so that the farewell is recorded
   callbacks.stop();
 }
 
@@ -99,7 +81,7 @@ ServoCalibration Board::Impl::servo_calibration(int channel) {
 }
 
 void Board::Impl::keep(std::unique_ptr<Recording> own) {
-  const std::lock_guard lock(keeping);
+  const std::lock_guard lock(mutex);
   recording.swap(own);
 }
 
@@ -109,7 +91,6 @@ void Board::Impl::listen() {
       const std::lock_guard lock(mutex);
       state = fresh;
       ++states;
-      in_control = async.in_control();
       for_each_queue([&](States::Queue& queue) { queue.put(fresh); });
     }
     news.notify_all();
@@ -121,7 +102,6 @@ void Board::Impl::listen() {
       const std::lock_guard lock(mutex);
       link = fresh;
       state = async.state();  // heartbeats change `safe`
-      in_control = async.in_control();
     }
     news.notify_all();
     callbacks.notify(fresh);
@@ -188,72 +168,51 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   });
 }
 
-void Board::Impl::deliver(const Command& command) {
-  if (const PostResult result = post_now(command); !result) {
-    RefusedPost refused{command, Refusal::none, result};
-    refused.command.text = refused.command.text2 = Text();
-    callbacks.notify(refused);
+void Board::Impl::deliver(const CommandOrGroup& letter) {
+  PostResult result = PostResult::no_link;
+  try {
+    result = std::visit([this](const auto& what) { return async.post(what); }, letter);
+  } catch (const Error&) {  // the program may have released control after the post
   }
-}
-
-void Board::Impl::deliver(const Setpoints& setpoints) {
-  if (const PostResult result = post_now(setpoints); !result) {
-    RefusedPost refused{setpoints[0], Refusal::none, result};
-    refused.group = static_cast<std::uint8_t>(setpoints.size());
-    callbacks.notify(refused);
-  }
+  if (result) return;
+  RefusedPost refused{first_of(letter), Refusal::none, result};
+  refused.command.text = refused.command.text2 = Text();
+  const auto* const group = std::get_if<Setpoints>(&letter);
+  if (group != nullptr) refused.group = static_cast<std::uint8_t>(group->size());
+  callbacks.notify(refused);
 }
 
 void Board::Impl::on_end() { identity = async.identity(); }
 
-void Board::Impl::shut() {
-  const bool first = mark_closed([this] {
-    for_each_queue([](States::Queue& queue) { queue.end(); });
-    last_statistics = async.statistics();
-    last_counters = async.carrier_counters();
-    last_paths = async.paths();
-  });
-  if (!first) return;
+void Board::Impl::on_close() {
+  for_each_queue([](States::Queue& queue) { queue.end(); });
+  last_statistics = async.statistics();
+  last_counters = async.carrier_counters();
+  last_paths = async.paths();
   look_timer.cancel();
-  async.async_close(farewell_limit, [this](const CommandResult&) { end_loop(); });
 }
 
-void Board::Impl::require_control(std::string_view what) {
-  const std::lock_guard lock(mutex);
-  r4::require_control(async.role(), what);
-}
-
-void Board::Impl::require_sendable(const Setpoints& setpoints) {
-  require_any(setpoints);
-  const std::lock_guard lock(mutex);
-  r4::require_control(async.role(), setpoints);
-}
-void Board::Impl::require_sendable(const Command& command) {
+void Board::Impl::require_sendable(const CommandOrGroup& what) {
+  if (const auto* const group = std::get_if<Setpoints>(&what)) {
+    require_any(*group);
+    return require_control(async.role(), *group);
+  }
+  const Command command = first_of(what);
   require_valid(command);
+  require_control(async.role(), command);
   const std::lock_guard lock(mutex);
-  r4::require_control(async.role(), command);
-  if (command.kind != CommandKind::setting) return;
   for (const std::string& path : path_names) require_cable(path, command);
 }
 
-std::shared_ptr<const Board::Impl::Part> Board::Impl::execute(const Command& command,
-                                                              Duration timeout) {
-  require_sendable(command);
-  const std::string text = shown(command);
-  require_timeout(text, timeout);
-  return confirmed(command, run(text, start_of(OwnCommand(command)), timeout,
-                                command.kind == CommandKind::stop));
-}
-
-void Board::Impl::execute(const Setpoints& setpoints, Duration timeout) {
-  require_sendable(setpoints);
-  const std::string text = shown(setpoints);
-  require_timeout(text, timeout);
-  confirmed(setpoints, run(text, start_of(setpoints), timeout));
-}
-
-void Board::Impl::execute(const std::string& request, Start start, Duration timeout) {
-  confirmed(request, run(request, std::move(start), timeout));
+void Board::Impl::execute(const CommandOrGroup& what, Duration timeout) {
+  require_sendable(what);
+  const bool stop = first_of(what).kind == CommandKind::stop;
+  const auto run_it = [&](const auto& each) {
+    const std::string text = shown(each);
+    require_timeout(text, timeout);
+    confirmed(each, run(text, start_of(what), timeout, stop));
+  };
+  std::visit(run_it, what);
 }
 
 std::shared_ptr<const Board::Impl::Part> Board::Impl::run(const std::string& text, Start start,
@@ -266,26 +225,17 @@ std::shared_ptr<const Board::Impl::Part> Board::Impl::run(const std::string& tex
   return {call, &part};
 }
 
-PostResult Board::Impl::post(const Command& command) {
-  require_sendable(command);
+PostResult Board::Impl::post(const CommandOrGroup& what) {
+  require_sendable(what);
+  const CommandKind kind = first_of(what).kind;
   const std::lock_guard lock(mutex);
-  const bool stop = command.kind == CommandKind::stop;
-  if (closed || (!in_control && !stop)) return PostResult::no_link;
-  if (drives_output(command.kind) && is_held_back()) return PostResult::not_armed;
-  return box.put(command) ? PostResult::sent : PostResult::queue_full;
-}
-PostResult Board::Impl::post(const Setpoints& setpoints) {
-  require_sendable(setpoints);
-  const std::lock_guard lock(mutex);
-  if (closed || !in_control) return PostResult::no_link;
-  if (is_held_back()) return PostResult::not_armed;
-  return box.put(setpoints) ? PostResult::sent : PostResult::queue_full;
-}
-// True if output commands are refused here; counts the refusal. Under the lock.
-bool Board::Impl::is_held_back() {
-  if (arming != Arming::required || disarmed_by == DisarmCause::none) return false;
-  ++refused_here;
-  return true;
+  if (closed || (!link.in_control && kind != CommandKind::stop)) return PostResult::no_link;
+  const bool disarmed = arming == Arming::required && disarmed_by != DisarmCause::none;
+  if (disarmed && drives_output(kind)) {
+    ++refused_here;
+    return PostResult::not_armed;
+  }
+  return box.put(what) ? PostResult::sent : PostResult::queue_full;
 }
 
 }  // namespace r4

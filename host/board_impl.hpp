@@ -31,31 +31,25 @@
 namespace r4 {
 
 // More than 15 members, grouped by the thread that may touch them.
-struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
+struct Board::Impl final : BlockingLoop {
   using CarriersMaker = std::function<std::vector<std::unique_ptr<Carrier>>(Loop& loop)>;
   Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first);
   // Starts the threads. Throws Error, also if the system has no thread or descriptor.
   static std::shared_ptr<Impl> started(const CarriersMaker& make, BoardOptions options,
                                        BoardCallbacks first);
-  void start();
   // Idempotent, from any thread.
   void close();
 
   // --- on any thread
 
-  void require_control(std::string_view what);
-  void require_sendable(const Command& command);
-  void require_sendable(const Setpoints& setpoints);
-  // Executes a command, a group or the named request. Throws Error unless the board confirms it.
-  std::shared_ptr<const Part> execute(const Command& command, Duration timeout);
-  void execute(const Setpoints& setpoints, Duration timeout);
-  void execute(const std::string& request, Start start, Duration timeout);
-  // As execute(), but returns any outcome. Throws Error for an unknown outcome or a closed board.
+  void require_sendable(const CommandOrGroup& what);
+  // Throws Error unless the board confirms it.
+  void execute(const CommandOrGroup& what, Duration timeout);
+  // Executes a command, a group or the named request, and returns any outcome. Throws Error if it
+  // is unknown or the board is closed.
   std::shared_ptr<const Part> run(const std::string& text, Start start, Duration timeout,
                                   bool stop = false);
-  PostResult post(const Command& command);
-  PostResult post(const Setpoints& setpoints);
-  bool is_held_back();
+  PostResult post(const CommandOrGroup& what);
   template <class Predicate>
   bool wait_for_news(Duration timeout, Predicate arrived) {
     return BlockingLoop::wait_for_news([this] { return name; }, timeout, std::move(arrived));
@@ -86,20 +80,10 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
 
   void listen();
   void take_name();
-  // The program may have released control after the post.
-  template <class What>
-  PostResult post_now(const What& what) {
-    try {
-      return async.post(what);
-    } catch (const Error&) {
-      return PostResult::no_link;
-    }
-  }
-  void deliver(const Command& command);
-  void deliver(const Setpoints& setpoints);
+  void deliver(const CommandOrGroup& letter);
   void take_uarts(const State& fresh);
   void on_end() override;
-  void shut();
+  void on_close() override;
   void look_at_callbacks();
   void on_callback_end(Clock::duration busy);
 
@@ -109,8 +93,6 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   AsyncBoard async;
   PostBox box;
   CallbackThread callbacks;
-  std::mutex keeping;  // guards `recording`
-  std::unique_ptr<Recording> recording;
 
   // Used on the loop only.
   asio::steady_timer look_timer{io};
@@ -131,13 +113,20 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   UartInbox uarts[uart_channels];
   LinkStatus link;
   BoardIdentity identity;
-  bool in_control = false;
   DisarmCause disarmed_by = DisarmCause::not_yet;
   std::uint64_t refused_here = 0;  // posts that did not reach the loop
   std::array<std::optional<ServoCalibration>, servo_channels> servo_calibrations;
   Statistics last_statistics;
   CarrierCounters last_counters;
   std::vector<PathStatus> last_paths;
+  std::unique_ptr<Recording> recording;
 };
+
+// Throws Error unless the board has confirmed `what`.
+template <class What, class Part>
+Part confirmed(const What& what, Part part) {
+  if (part->result.outcome == Outcome::confirmed) return part;
+  throw Error(explain(what, part->result, part->link));
+}
 
 }  // namespace r4

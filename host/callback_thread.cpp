@@ -6,8 +6,9 @@
 
 namespace r4 {
 
-CallbackThread::CallbackThread(std::function<void(Clock::duration)> on_end)
-    : on_end_(std::move(on_end)), ring_(capacity) {}
+CallbackThread::CallbackThread(std::function<void(Clock::duration)> on_end,
+                               std::function<Board::UartData(int channel)> take_uart)
+    : on_end_(std::move(on_end)), take_uart_(std::move(take_uart)), ring_(capacity) {}
 
 // If a callback destroys the board, this thread cannot join itself.
 CallbackThread::~CallbackThread() {

@@ -46,13 +46,13 @@ class CallbackThread {
   static constexpr std::size_t capacity = 64;
 
   // `on_end` is called on this thread after each callback, with the callback's run time.
-  explicit CallbackThread(std::function<void(Clock::duration)> on_end);
+  // `take_uart` removes and returns the waiting bytes.
+  CallbackThread(std::function<void(Clock::duration)> on_end,
+                 std::function<Board::UartData(int channel)> take_uart);
   ~CallbackThread();
   CallbackThread(const CallbackThread&) = delete;
   CallbackThread& operator=(const CallbackThread&) = delete;
 
-  // Call take_uart() before start(). `take` removes and returns the waiting bytes.
-  void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
   // Keeps `owner` until the thread ends.
   void start(std::shared_ptr<void> owner);
   // After the return no callback runs, except a callback that called stop().
@@ -121,7 +121,7 @@ class CallbackThread {
   void keep(const Kind&) {}
 
   const std::function<void(Clock::duration)> on_end_;
-  std::function<Board::UartData(int)> take_uart_;
+  const std::function<Board::UartData(int)> take_uart_;
   std::thread thread_;
   std::atomic<std::thread::id> id_{};
   std::mutex joining_;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "commands/command_help.hpp"
 #include "explain_safe.hpp"
 #include "r4link/commands/command_text.hpp"
@@ -80,40 +78,43 @@ CauseWords words_of(LinkCause cause) {
 constexpr const char* clear_on_purpose =
     "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), ";
 
-Words disarm_words(DisarmCause cause) {
+// Why outputs are off, and the action before arm().
+CauseWords words_of(DisarmCause cause) {
   switch (cause) {
+    case DisarmCause::none:
+      return {"none", "", ""};
     case DisarmCause::not_yet:
-      return {"a session begins disarmed", ""};
+      return {"not yet", "a session begins disarmed", ""};
     case DisarmCause::stop:
-      return {"an emergency stop came", "when the danger is over, "};
+      return {"stop", "an emergency stop came", "when the danger is over, "};
     case DisarmCause::handle:
-      return {"the dead-man's handle was released", "hold the handle, "};
+      return {"handle", "the dead-man's handle was released", "hold the handle, "};
     case DisarmCause::proximity:
-      return {"something came nearer than a proximity threshold", "clear the way, "};
+      return {"proximity", "something came nearer than a proximity threshold", "clear the way, "};
     case DisarmCause::watchdog:
-      return {"a task of the board's firmware missed its deadline", "find out why, "};
+      return {"watchdog", "a task of the board's firmware missed its deadline", "find out why, "};
     case DisarmCause::fault:
-      return {"the board found a fault in itself", "check its chips and wiring, "};
+      return {"fault", "the board found a fault in itself", "check its chips and wiring, "};
     case DisarmCause::link:
-      return {"the link was lost, and the board did not bring its outputs back", ""};
+      return {"link", "the link was lost, and the board did not bring its outputs back", ""};
     case DisarmCause::restart:
-      return {"the board has begun again", "set its thresholds (U) again, "};
+      return {"restart", "the board has begun again", "set its thresholds (U) again, "};
     case DisarmCause::supply:
-      return {"relay 1, the motor supply, was opened", ""};
+      return {"supply", "relay 1, the motor supply, was opened", ""};
     case DisarmCause::sleep:
-      return {"this computer slept", ""};
+      return {"sleep", "this computer slept", ""};
     case DisarmCause::earlier_stop:
-      return {"stopped before this program began", clear_on_purpose};
+      return {"earlier stop", "stopped before this program began", clear_on_purpose};
     case DisarmCause::earlier_watchdog:
-      return {"a task of the board's firmware missed its deadline before this program began",
+      return {"earlier watchdog",
+              "a task of the board's firmware missed its deadline before this program began",
               clear_on_purpose};
     case DisarmCause::earlier_fault:
-      return {"the board found a fault in itself before this program controlled it",
+      return {"earlier fault",
+              "the board found a fault in itself before this program controlled it",
               clear_on_purpose};
-    case DisarmCause::none:
-      break;
   }
-  return {};
+  return {"unknown", "", ""};
 }
 
 // Reported only without another cause, because an unused path does not disturb the other paths.
@@ -144,10 +145,6 @@ Words link_words(const LinkStatus& link) {
   }
   if (const auto cause = link.cause()) return {words_of(*cause).reason, words_of(*cause).fix};
   return {"the board is active and takes our commands", ""};
-}
-
-bool link_is_well(const LinkStatus& link) {
-  return link.state == HostLinkState::active && link.causes.without(harmless).empty();
 }
 
 // In the functions below, `command` is null for a request that is not a command.
@@ -263,7 +260,7 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
       }
       const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(result.elapsed).count();
       words.reason = fmt::format("not confirmed within {} ms", ms);
-      if (link_is_well(link)) {
+      if (link.state == HostLinkState::active && link.causes.without(harmless).empty()) {
         words.reason += "; it may have been executed or not";
         words.fix =
             "allow more time, or send it again; `r4 bench` shows how many datagrams are lost";
@@ -331,17 +328,11 @@ Problem problem_of(std::string thing, Words words, const CommandResult& result) 
 }  // namespace
 
 const char* to_text(LinkCause cause) { return words_of(cause).name; }
+const char* to_text(DisarmCause cause) { return words_of(cause).name; }
 
 const char* to_text(TransportTrouble trouble) {
-  switch (trouble) {
-    case TransportTrouble::none:
-      break;
-    case TransportTrouble::foreign_frames:
-      return "foreign frames";
-    case TransportTrouble::late_frames:
-      return "late frames";
-  }
-  return "none";
+  if (trouble == TransportTrouble::foreign_frames) return to_text(LinkCause::foreign_frames);
+  return trouble == TransportTrouble::late_frames ? to_text(LinkCause::late_frames) : "none";
 }
 
 Problem explain(LinkCause cause) {
@@ -350,10 +341,10 @@ Problem explain(LinkCause cause) {
 }
 
 Problem explain(std::string_view what, DisarmCause cause) {
-  const Words words = disarm_words(cause);
-  const bool first = words.fix.empty();
-  return {ErrorKind::refused, std::string(what), "not armed: " + words.reason,
-          words.fix + (first ? "call arm()" : "then call arm()")};
+  const CauseWords words = words_of(cause);
+  const std::string first = words.fix;
+  return {ErrorKind::refused, std::string(what), "not armed: " + std::string(words.reason),
+          first + (first.empty() ? "call arm()" : "then call arm()")};
 }
 
 Problem explain(std::string_view name, const LinkStatus& link) {

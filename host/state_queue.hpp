@@ -59,7 +59,7 @@ class States::Queue {
   }
 
   std::optional<ReceivedState> take(Duration timeout) {
-    const auto deadline = BlockingLoop::Clock::now() + BlockingLoop::bounded(timeout);
+    const auto deadline = BlockingLoop::Clock::now() + bounded(timeout);
     std::unique_lock lock(mutex_);
     BlockingLoop::wait_until(lock, news_, deadline, on_wait_,
                              [&] { return ended_ || count_ != 0 || gap_ != 0; });

@@ -16,8 +16,8 @@ template <class Predicate>
 bool ArmRequests::end_those(Predicate which, Outcome outcome, Refusal code, Time now) {
   const std::size_t ended = std::erase_if(requests_, [&](const Request& each) {
     if (!which(each)) return false;
-    ends_.end(each.ticket, {outcome, code, now - each.started,
-                            outcome == Outcome::not_armed ? cause() : DisarmCause::none});
+    const DisarmCause disarmed = outcome == Outcome::not_armed ? cause() : DisarmCause::none;
+    effects_.end(each.ticket, {outcome, code, now - each.started, disarmed}, counts_);
     return true;
   });
   if (requests_.empty() && machine_.under_way()) {
@@ -111,7 +111,7 @@ void ArmRequests::begin_anew() {
 void ArmRequests::report() {
   if (told_ == machine_.cause()) return;
   told_ = machine_.cause();
-  effects_.report(ArmingChanged{told_});
+  effects_.report(told_);
 }
 
 }  // namespace r4

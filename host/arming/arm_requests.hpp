@@ -18,7 +18,6 @@
 #include <utility>
 #include <vector>
 
-#include "../link/command_ends.hpp"
 #include "../link/effects.hpp"
 #include "../link/heard_board.hpp"
 #include "../measurement/time.hpp"
@@ -32,8 +31,8 @@ class ArmRequests {
  public:
   static constexpr std::size_t max_requests = 64;
 
-  ArmRequests(Arming mode, Effects& effects, CommandEnds& ends)
-      : mode_(mode), effects_(effects), ends_(ends) {}
+  ArmRequests(Arming mode, Effects& effects, Statistics& counts)
+      : mode_(mode), effects_(effects), counts_(counts) {}
 
   bool may_drive() const { return mode_ == Arming::off || machine_.armed(); }
   DisarmCause cause() const { return machine_.cause(); }
@@ -79,7 +78,7 @@ class ArmRequests {
 
   const Arming mode_;
   Effects& effects_;
-  CommandEnds& ends_;
+  Statistics& counts_;
   ArmingMachine machine_;
   DisarmCause told_ = DisarmCause::not_yet;
   std::vector<Request> requests_;

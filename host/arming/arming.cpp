@@ -3,40 +3,6 @@
 
 namespace r4 {
 
-const char* to_text(DisarmCause cause) {
-  switch (cause) {
-    case DisarmCause::none:
-      return "none";
-    case DisarmCause::not_yet:
-      return "not yet";
-    case DisarmCause::stop:
-      return "stop";
-    case DisarmCause::handle:
-      return "handle";
-    case DisarmCause::proximity:
-      return "proximity";
-    case DisarmCause::watchdog:
-      return "watchdog";
-    case DisarmCause::fault:
-      return "fault";
-    case DisarmCause::link:
-      return "link";
-    case DisarmCause::restart:
-      return "restart";
-    case DisarmCause::supply:
-      return "supply";
-    case DisarmCause::sleep:
-      return "sleep";
-    case DisarmCause::earlier_stop:
-      return "earlier stop";
-    case DisarmCause::earlier_watchdog:
-      return "earlier watchdog";
-    case DisarmCause::earlier_fault:
-      return "earlier fault";
-  }
-  return "unknown";
-}
-
 namespace {
 
 DisarmCause cause_of(SafeReason reason) {

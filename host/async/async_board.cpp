@@ -24,11 +24,6 @@ std::vector<std::unique_ptr<Carrier>> only(std::unique_ptr<Carrier> carrier) {
   return carriers;
 }
 
-std::vector<std::unique_ptr<Carrier>> checked(std::vector<std::unique_ptr<Carrier>> carriers) {
-  require_paths(carriers.size());
-  return carriers;
-}
-
 constexpr AsyncBoard::Duration posted_stop_time{1000};
 
 }  // namespace
@@ -47,8 +42,8 @@ AsyncBoard::AsyncBoard(const executor_type& executor, std::unique_ptr<Carrier> c
 AsyncBoard::AsyncBoard(const executor_type& executor,
                        std::vector<std::unique_ptr<Carrier>> carriers, BoardOptions options)
     : impl_(with_system_errors("a board", [&] {
-        return std::make_shared<Impl>(executor.context(), checked(std::move(carriers)),
-                                      std::move(options));
+        require_paths(carriers.size());
+        return std::make_shared<Impl>(executor.context(), std::move(carriers), std::move(options));
       })) {}
 
 AsyncBoard::~AsyncBoard() {
@@ -85,15 +80,14 @@ void AsyncBoard::start_send(const What& what, Duration timeout, CompletionPtr co
   Impl& impl = *impl_;
   impl.give_up_slot(what);
   impl.begin(std::move(completion),
-             [&] { return impl.session.send(what, Impl::time_of(timeout), impl.now); });
+             [&] { return impl.session.send(what, bounded(timeout), impl.now); });
 }
 template void AsyncBoard::start_send(const Command&, Duration, CompletionPtr);
 template void AsyncBoard::start_send(const Setpoints&, Duration, CompletionPtr);
 
 void AsyncBoard::start_arm(Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
-  impl.begin(std::move(completion),
-             [&] { return impl.session.arm(Impl::time_of(timeout), impl.now); });
+  impl.begin(std::move(completion), [&] { return impl.session.arm(bounded(timeout), impl.now); });
 }
 
 void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
@@ -101,7 +95,7 @@ void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
   impl.enter(Completion::How::post, [&] {
     const Ticket id = impl.waits.next_id();
     completion->listen(Cancel(impl_, id));
-    impl.waits.add({Impl::Waits::For::active, id, 0, impl.now, impl.now + Impl::time_of(timeout),
+    impl.waits.add({Impl::Waits::For::active, id, 0, impl.now, impl.now + bounded(timeout),
                     std::move(completion)});
   });
 }
@@ -114,13 +108,10 @@ class AsyncBoard::TimingSteps final : public Impl::Sequence {
         deadline_(Impl::steady_now() + timeout) {}
 
   void begin() {
-    const auto send = [this] {
-      const LinkTimingStep& step = steps_[done_];
-      const std::string value = std::to_string(step.ms);
-      const Time left = std::max(Time{0}, deadline_ - impl_.now);
-      return impl_.session.send(Command::setting(step.key, Text(value)), left, impl_.now);
-    };
-    impl_.begin(CompletionPtr(this), send, id_);
+    const LinkTimingStep& step = steps_[done_];
+    const std::string value = std::to_string(step.ms);
+    send(Command::setting(step.key, Text(value)),
+         std::max(Time{0}, deadline_ - Impl::steady_now()));
   }
   void complete(const CommandResult& result, How how) override {
     if (result.outcome != Outcome::confirmed || ++done_ == steps_.size()) return end(result, how);
@@ -136,26 +127,17 @@ class AsyncBoard::TimingSteps final : public Impl::Sequence {
 class AsyncBoard::TransferSteps final : public Impl::Sequence {
  public:
   TransferSteps(Impl& impl, Time timeout, CompletionPtr completion)
-      : Sequence(impl, std::move(completion)),
-        timeout_(timeout),
-        deadline_(Impl::steady_now() + timeout) {}
+      : Sequence(impl, std::move(completion)), deadline_(Impl::steady_now() + timeout) {}
 
-  void begin(const Command& command) {
-    impl_.begin(CompletionPtr(this),
-                [&] { return impl_.session.send(command, timeout_, impl_.now); });
-  }
+  using Sequence::send;
   void complete(const CommandResult& result, How how) override {
     CommandResult ended = result;
-    if (!begun_) {
+    if (!pnum_) {
       if (ended.outcome != Outcome::confirmed) return end(ended, how);
-      begun_ = true;
       pnum_ = ended.pnum;
-      return impl_.enter(How::post, [&] {
-        impl_.waits.add(
-            {Impl::Waits::For::answer, id_, pnum_, impl_.now, deadline_, CompletionPtr(this)});
-      });
+      return wait(Impl::Waits::For::answer, *pnum_, deadline_);
     }
-    ended.pnum = pnum_;
+    ended.pnum = *pnum_;
     ended.executed = 1;
     if (ended.outcome == Outcome::confirmed) {
       ended.transfer = impl_.session.state().i2c_answer;
@@ -165,10 +147,8 @@ class AsyncBoard::TransferSteps final : public Impl::Sequence {
   }
 
  private:
-  const Time timeout_;
   const Time deadline_;
-  bool begun_ = false;      // the board has confirmed the command
-  std::uint32_t pnum_ = 0;  // of the command
+  std::optional<std::uint32_t> pnum_;  // of the command, when the board has confirmed it
 };
 
 void AsyncBoard::start_transfer(const Command& command, Duration timeout,
@@ -178,7 +158,8 @@ void AsyncBoard::start_transfer(const Command& command, Duration timeout,
     throw Error(ErrorKind::usage, shown(command), "is not a transfer on the I2C bus",
                 "send it with send() or async_send()");
   }
-  (new TransferSteps(*impl_, Impl::time_of(timeout), std::move(completion)))->begin(command);
+  (new TransferSteps(*impl_, bounded(timeout), std::move(completion)))
+      ->send(command, bounded(timeout));
 }
 
 class AsyncBoard::Farewell final : public Impl::Sequence {
@@ -199,7 +180,7 @@ void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
   const auto then = [](Impl& each) { each.close(); };
   impl.begin(CompletionPtr(new Farewell(impl, then, std::move(completion))),
-             [&] { return impl.leave(Impl::time_of(timeout)); });
+             [&] { return impl.leave(bounded(timeout)); });
 }
 
 BoardRole AsyncBoard::role() const { return impl_->role; }
@@ -233,7 +214,7 @@ void AsyncBoard::start_release_control(Duration timeout, CompletionPtr completio
       CompletionPtr(new Farewell(impl, then, std::move(completion))),
       [&] {
         impl.cancel_waits();
-        return impl.session.release_control(Impl::time_of(timeout), impl.now);
+        return impl.session.release_control(bounded(timeout), impl.now);
       },
       0, Outcome::none);
 }
@@ -244,7 +225,7 @@ void AsyncBoard::require_link_timing(Duration board_timeout, Duration heartbeat)
 
 void AsyncBoard::start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                                    CompletionPtr completion) {
-  (new TimingSteps(*impl_, link_timing_steps(board_timeout, heartbeat), Impl::time_of(timeout),
+  (new TimingSteps(*impl_, link_timing_steps(board_timeout, heartbeat), bounded(timeout),
                    std::move(completion)))
       ->begin();
 }
@@ -306,7 +287,7 @@ void AsyncBoard::Impl::describe(const Device& device) {
   if (std::any_of(devices.begin(), devices.end(), is_same)) return;
   std::erase_if(devices, [&](const Device& each) { return device.takes_place_of(each); });
   devices.push_back(device);
-  describe_in_recording(device);
+  for (const auto& path : paths) path->tap.on_device(device);
 }
 
 void AsyncBoard::record(Recording& recording) {
@@ -319,7 +300,9 @@ void AsyncBoard::record(Recording& recording) {
   }
   impl.paths[0].tap.on_link(impl.session.link());
   impl.name_in_recording();
-  for (const Device& device : impl.devices) impl.describe_in_recording(device);
+  for (const Device& device : impl.devices) {
+    for (const auto& path : impl.paths) path->tap.on_device(device);
+  }
 }
 
 void AsyncBoard::Impl::name_in_recording() {
@@ -335,10 +318,6 @@ void AsyncBoard::Impl::warn_of_recordings() {
     if (news && !problem) problem = std::move(news);
   }
   if (problem) warn(std::move(*problem));
-}
-
-void AsyncBoard::Impl::describe_in_recording(const Device& device) {
-  for (const auto& path : paths) path->tap.on_device(device);
 }
 
 Subscription AsyncBoard::on_state(

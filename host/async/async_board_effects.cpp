@@ -54,13 +54,13 @@ void AsyncBoard::Impl::notify_all() {
         }
       },
       [&](const HeartbeatCame&) { call(callbacks.heartbeat, datagram); },
-      [&](const BoardIdentified& event) { on_identity(event.identity); },
-      [&](const CommandRefused& event) { call(callbacks.nack, event.nack, datagram); },
+      [&](const Identity& fresh) { on_identity(fresh); },
+      [&](const Nack& nack) { call(callbacks.nack, nack, datagram); },
       [&](const BadDatagramCame& event) { call(callbacks.bad, event.result, event.bytes); },
-      [&](const LinkChanged& event) {
-        paths[0].tap.on_link(event.status);
-        notify_paths(event.status);
-        call(callbacks.link, session.link());  // an earlier callback may have changed the link
+      [&](const LinkStatus& status) {
+        paths[0].tap.on_link(status);
+        notify_paths(status);
+        call(callbacks.link, session.link());  // an earlier callback may have changed it
       },
       [&](const CommandEnded& event) { waits.end(event.ticket, event.result); },
       [&](const BoardRestarted&) {
@@ -68,12 +68,12 @@ void AsyncBoard::Impl::notify_all() {
         backlog.forget();
         call(callbacks.restart);
       },
-      [&](const ArmingChanged&) {
-        callbacks.arming.each([&](auto& one) {  // an earlier callback may have changed the cause
+      [&](DisarmCause) {
+        callbacks.arming.each([&](auto& one) {  // an earlier callback may have changed it
           if (is_open()) guarded([&] { one(session.disarmed_by()); });
         });
       },
-      [&](const PostRefused& event) { call(callbacks.refused, event.refused); },
+      [&](const RefusedPost& refused) { call(callbacks.refused, refused); },
   };
   while (effects.any_events()) std::visit(notify, effects.take_event());
 }

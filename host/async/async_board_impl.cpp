@@ -50,28 +50,14 @@ Time AsyncBoard::Impl::begin_entry(Completion::How way) {
 void AsyncBoard::Impl::end_entry(Time late) {
   if (is_open() && late > very_late) {
     poll_wanted = true;
-    warn_of_hold_up(late);
+    const Inside warning(depth);
+    const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(late).count();
+    warn(
+        {ErrorKind::refused, "the event loop",
+         "it stood still: datagrams, also heartbeats, were sent " + std::to_string(ms) + " ms late",
+         "handlers on this loop must return at once; if none is slow, the "
+         "computer had no time for this program"});
   }
-  settle();
-}
-
-void AsyncBoard::Impl::on_sleep() {
-  backlog.on_sleep();
-  session.on_sleep(now);
-  cancel_waits();
-  poll_wanted = true;
-}
-
-void AsyncBoard::Impl::warn_of_hold_up(Time late) {
-  const Inside inside(depth);
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(late).count();
-  warn({ErrorKind::refused, "the event loop",
-        "it stood still: datagrams, also heartbeats, were sent " + std::to_string(ms) + " ms late",
-        "handlers on this loop must return at once; if none is slow, the "
-        "computer had no time for this program"});
-}
-
-void AsyncBoard::Impl::settle() {
   const Inside inside(depth);
   for (;;) {
     notify_all();
@@ -89,6 +75,14 @@ void AsyncBoard::Impl::settle() {
     }
   }
   if (has_link()) arm();
+}
+
+// Datagrams from before the sleep are dropped: they may wait in sockets and buffers.
+void AsyncBoard::Impl::on_sleep() {
+  backlog.on_sleep();
+  session.on_sleep(now);
+  cancel_waits();
+  poll_wanted = true;
 }
 
 bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
@@ -135,13 +129,12 @@ void AsyncBoard::Impl::open() {
     throw Error(ErrorKind::usage, paths.name(), "a board is opened once",
                 "make another one for the same URL");
   }
-  std::optional<Problem> problem;
+  std::size_t opened = 0;
   for (const auto& path : paths) {
-    open_path(*path, problem);
+    opened += open_path(*path) ? 1 : 0;
     if (phase != Phase::made) return;  // a callback for `up` has closed the board
   }
-  const auto is_opened = [](const auto& path) { return path->opened; };
-  if (std::none_of(paths.begin(), paths.end(), is_opened)) throw Error(*problem);
+  if (opened == 0) throw Error(*paths[0].trouble);
   for (const auto& path : paths) {
     if (path->trouble) report_trouble(*path);
     if (phase != Phase::made) return;
@@ -150,10 +143,10 @@ void AsyncBoard::Impl::open() {
   sleep_watch = SleepWatch();
   due = steady_now();
   enter(Completion::How::post, [this] { poll_wanted = true; });
-  if (problem) open_again();
+  if (opened != paths.size()) open_again();
 }
 
-void AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& problem) {
+bool AsyncBoard::Impl::open_path(Path& path) {
   path.opened = false;
   try {
     with_system_errors(path.carrier->name(), [&] { path.carrier->open(path); });
@@ -164,23 +157,23 @@ void AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& proble
       paths.close();
       throw;
     }
-    if (!problem) problem = error.problem();
     const bool news = !path.trouble || path.trouble->text() != error.problem().text();
     path.trouble = error.problem();
     if (news && phase == Phase::open) report_trouble(path);
   }
+  return path.opened;
 }
 
 void AsyncBoard::Impl::open_again() {
   reopening.expires_after(open_interval);
   reopening.async_wait([self = shared_from_this()](const std::error_code& error) {
     if (error || !self->has_link()) return;
-    std::optional<Problem> problem;
+    bool failed = false;
     for (const auto& path : self->paths) {
       if (path->opened || !self->has_link()) continue;
-      self->guarded([&] { self->open_path(*path, problem); });
+      self->guarded([&] { failed = !self->open_path(*path) || failed; });
     }
-    if (problem && self->has_link()) self->open_again();
+    if (failed && self->has_link()) self->open_again();
   });
 }
 
@@ -233,8 +226,7 @@ void AsyncBoard::Impl::become(BoardRole fresh) {
 // Sets the timer only for an earlier time. An early expiry costs one poll.
 void AsyncBoard::Impl::arm() {
   const Time next = waits.next(due);
-  if (armed && armed_for <= next) return;
-  armed = true;
+  if (armed_for <= next) return;
   armed_for = next;
   timer.expires_at(std::chrono::steady_clock::time_point(next));
   timer.async_wait([self = shared_from_this()](const std::error_code& error) {
@@ -244,7 +236,7 @@ void AsyncBoard::Impl::arm() {
 
 void AsyncBoard::Impl::on_timer() {
   if (!has_link()) return;
-  armed = false;
+  armed_for = Time::max();
   const bool notifies_backlog = backlog.on_timer();
   enter(Completion::How::dispatch, [this] {
     poll_wanted = true;
@@ -253,7 +245,7 @@ void AsyncBoard::Impl::on_timer() {
   if (notifies_backlog) notify_backlog();
 }
 
-void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
+void AsyncBoard::Impl::on_datagram(Path& path, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
     path.tap.on_received(bytes, now);
     if (backlog.drops()) return;
@@ -281,7 +273,7 @@ void AsyncBoard::Impl::notify_backlog() {
   });
 }
 
-void AsyncBoard::Impl::on_carrier_event(BoardPath& path, const CarrierEvent& event) {
+void AsyncBoard::Impl::on_carrier_event(Path& path, const CarrierEvent& event) {
   enter(Completion::How::dispatch, [&] {
     path.tap.on_carrier_event(event);
     report(event);
@@ -293,7 +285,7 @@ void AsyncBoard::Impl::on_carrier_event(BoardPath& path, const CarrierEvent& eve
   });
 }
 
-void AsyncBoard::Impl::on_overheard(BoardPath& path, std::string_view bytes) {
+void AsyncBoard::Impl::on_overheard(Path& path, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
     path.tap.on_sent(bytes);
     std::array<char, max_datagram + masking_room> room;

@@ -13,7 +13,6 @@
 #include <exception>
 #include <memory>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -28,8 +27,10 @@
 
 namespace r4 {
 
-// Outlives an AsyncBoard that a callback destroys. Large, because it implements all of AsyncBoard.
-struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<AsyncBoard::Impl> {
+// Outlives an AsyncBoard that a callback destroys. Larger than 15 members and 40 functions, because
+// it implements every function of AsyncBoard.
+struct AsyncBoard::Impl final : std::enable_shared_from_this<AsyncBoard::Impl> {
+  using Path = BoardPath<Impl>;
   using Waits = r4::Waits<CompletionPtr>;
   class Sequence;
   struct Callbacks {
@@ -59,10 +60,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
 
   static Time steady_now() {
     return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
-  }
-  // At most a day, so that sums cannot overflow.
-  static Time time_of(Duration timeout) {
-    return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
   }
 
   // Runs the user's code. An exception leaves io.run() from a separate handler: in a handler of the
@@ -113,10 +110,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Time begin_entry(Completion::How way);
   void end_entry(Time late);
   void on_sleep();
-  void warn_of_hold_up(Time late);
   void send_all();
   void notify_all();
-  void settle();
   bool end_waits();
 
   // `start` returns the command's ticket; if 0, the command ends as `not_taken`. `id`: the ticket
@@ -153,8 +148,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   bool has_come(const Waits::Condition& condition) const;
   void cancel(Ticket id);
   void open();
-  void open_path(BoardPath& path, std::optional<Problem>& problem);
-  void report_trouble(BoardPath& path) {
+  bool open_path(Path& path);
+  void report_trouble(Path& path) {
     on_carrier_event(path, {CarrierEvent::Kind::down, *path.trouble});
   }
   void open_again();
@@ -166,7 +161,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
 
   void name_in_recording();
   void describe(const Device& device);
-  void describe_in_recording(const Device& device);
   // X:OFF gives up the device with this slot.
   void give_up_slot(const Command& command);
   void give_up_slot(const Setpoints&) {}
@@ -175,11 +169,11 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void arm();
   void on_timer();
 
-  void on_datagram(BoardPath& path, std::string_view bytes) override;
-  void on_drained() override;
+  void on_datagram(Path& path, std::string_view bytes);
+  void on_drained();
   void notify_backlog();
-  void on_carrier_event(BoardPath& path, const CarrierEvent& event) override;
-  void on_overheard(BoardPath& path, std::string_view bytes) override;
+  void on_carrier_event(Path& path, const CarrierEvent& event);
+  void on_overheard(Path& path, std::string_view bytes);
 
   SendResult transmit(const Sending& sending) const;
   void on_identity(const Identity& fresh);
@@ -191,7 +185,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void notify_paths(const LinkStatus& status);
 
   asio::io_context& io;
-  BoardPaths paths;
+  BoardPaths<Impl> paths;
   std::vector<Device> devices;  // described in recordings
   std::vector<const Device*> attaching;
   std::uint32_t boots = 0;           // number of restarts of the board
@@ -205,7 +199,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Waits waits;
   SleepWatch sleep_watch;
 
-  int depth = 0;  // calls of enter() and settle() under way
+  int depth = 0;  // calls of enter() and end_entry() under way
   bool poll_wanted = false;
   Completion::How how = Completion::How::post;
   Phase phase = Phase::made;
@@ -215,9 +209,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Time due{0};
   asio::steady_timer timer;
   asio::steady_timer reopening;
-  LinkStatus reported;  // of the last report of paths
-  bool armed = false;
-  Time armed_for{0};
+  LinkStatus reported;            // of the last report of paths
+  Time armed_for = Time::max();   // when the timer expires; max(): never
   std::atomic<Time::rep> fed{0};  // the last feed(); 0: passed to the session
 };
 
@@ -236,6 +229,16 @@ class AsyncBoard::Impl::Sequence : public Completion {
   Sequence(Impl& impl, CompletionPtr completion)
       : impl_(impl), completion_(std::move(completion)) {}
   virtual ~Sequence() = default;
+  // Begins a step. complete() receives its end.
+  void send(const Command& command, Time timeout) {
+    impl_.begin(
+        CompletionPtr(this), [&] { return impl_.session.send(command, timeout, impl_.now); }, id_);
+  }
+  void wait(Waits::For what, std::uint32_t pnum, Time deadline) {
+    impl_.enter(How::post, [&] {
+      impl_.waits.add({what, id_, pnum, impl_.now, deadline, CompletionPtr(this)});
+    });
+  }
   // Destroys this, then passes the result to the user's handler.
   void end(CommandResult result, How called) {
     result.elapsed = steady_now() - started_;
@@ -244,10 +247,10 @@ class AsyncBoard::Impl::Sequence : public Completion {
     handler->complete(result, called);
   }
 
-  Impl& impl_;     // owns this
-  Ticket id_ = 0;  // of the first step; cancels all steps
+  Impl& impl_;  // owns this
 
  private:
+  Ticket id_ = 0;  // of the first step; cancels all steps
   const Time started_ = steady_now();
   CompletionPtr completion_;
 };

@@ -16,19 +16,9 @@
 
 namespace r4 {
 
+template <class Owner>
 class BoardPath final : public Carrier::Handler {
  public:
-  class Owner {
-   public:
-    virtual void on_datagram(BoardPath& path, std::string_view bytes) = 0;
-    virtual void on_drained() = 0;
-    virtual void on_carrier_event(BoardPath& path, const CarrierEvent& event) = 0;
-    virtual void on_overheard(BoardPath& path, std::string_view bytes) = 0;
-
-   protected:
-    ~Owner() = default;
-  };
-
   BoardPath(Owner& owner, std::size_t number, std::unique_ptr<Carrier> transport)
       : index(number), carrier(std::move(transport)), owner_(owner) {}
 
@@ -50,20 +40,21 @@ class BoardPath final : public Carrier::Handler {
   Owner& owner_;
 };
 
+template <class Owner>
 class BoardPaths {
  public:
-  using Iterator = std::vector<std::unique_ptr<BoardPath>>::const_iterator;
+  using Path = BoardPath<Owner>;
 
-  BoardPaths(BoardPath::Owner& owner, std::vector<std::unique_ptr<Carrier>> transports) {
+  BoardPaths(Owner& owner, std::vector<std::unique_ptr<Carrier>> transports) {
     for (std::unique_ptr<Carrier>& each : transports) {
-      paths_.push_back(std::make_unique<BoardPath>(owner, paths_.size(), std::move(each)));
+      paths_.push_back(std::make_unique<Path>(owner, paths_.size(), std::move(each)));
     }
   }
 
   std::size_t size() const { return paths_.size(); }
-  BoardPath& operator[](std::size_t path) const { return *paths_[path]; }
-  Iterator begin() const { return paths_.begin(); }
-  Iterator end() const { return paths_.end(); }
+  Path& operator[](std::size_t path) const { return *paths_[path]; }
+  auto begin() const { return paths_.begin(); }
+  auto end() const { return paths_.end(); }
 
   void close() {
     for (const auto& path : paths_) path->carrier->close();
@@ -93,7 +84,7 @@ class BoardPaths {
   }
 
  private:
-  std::vector<std::unique_ptr<BoardPath>> paths_;
+  std::vector<std::unique_ptr<Path>> paths_;
   std::string name_;
   CarrierCounters counters_;
 };

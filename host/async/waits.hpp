@@ -57,7 +57,10 @@ class Waits {
     const std::size_t before = conditions_.size();
     std::erase_if(conditions_, [&](Condition& each) {
       const std::optional<Outcome> outcome = outcome_of(std::as_const(each));
-      if (outcome) give(each, *outcome, now);
+      if (outcome) {
+        ended_.push_back(
+            {{*outcome, Refusal::none, now - each.started}, std::move(each.completion)});
+      }
       return outcome.has_value();
     });
     return conditions_.size() != before;
@@ -90,11 +93,6 @@ class Waits {
     Ticket id = 0;
     CompletionPtr completion;
   };
-
-  void give(Condition& condition, Outcome outcome, Time now) {
-    ended_.push_back(
-        {{outcome, Refusal::none, now - condition.started}, std::move(condition.completion)});
-  }
 
   std::vector<Command> commands_;
   std::vector<Condition> conditions_;

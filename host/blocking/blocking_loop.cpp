@@ -151,19 +151,28 @@ void BlockingLoop::end(Call& call, std::size_t part, const CommandResult& result
   if (--call.left == 0) call.ended.notify_all();
 }
 
-void BlockingLoop::close(std::function<void()> shut) {
-  {
-    const std::lock_guard lock(mutex);
-    if (!closed) asio::post(io, std::move(shut));
-  }
+void BlockingLoop::close(const std::vector<AsyncBoard*>& boards) {
+  post_to_loop([this, boards] { shut(boards); });
   const std::lock_guard lock(joining_);
   if (thread_.joinable()) thread_.join();
 }
 
-void BlockingLoop::end_loop() {
-  work_.reset();
-  // Posted twice, because begin() may post the end of a command on a closed board.
-  asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
+void BlockingLoop::shut(const std::vector<AsyncBoard*>& boards) {
+  {
+    const std::lock_guard lock(mutex);
+    if (std::exchange(closed, true)) return;
+    on_close();
+  }
+  news.notify_all();
+  leaving_ = boards.size();
+  for (AsyncBoard* const board : boards) {
+    board->async_close(farewell_limit, [this](const CommandResult&) {
+      if (--leaving_ != 0) return;
+      work_.reset();
+      // Posted twice, because begin() may post the end of a command on a closed board.
+      asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
+    });
+  }
 }
 
 }  // namespace r4

@@ -26,6 +26,7 @@
 #include <thread>
 #include <vector>
 
+#include "../measurement/time.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/control/boot_clock.hpp"
@@ -38,8 +39,6 @@ class BlockingLoop {
   using Clock = std::chrono::steady_clock;
   using Duration = std::chrono::milliseconds;
   static constexpr Duration wait_interval{50};
-  // The longest wait of close() for the boards' reports that they are free.
-  static constexpr Duration farewell_limit{100};
 
   struct Call;
   using CallPtr = std::shared_ptr<Call>;
@@ -126,10 +125,6 @@ class BlockingLoop {
     return true;
   }
 
-  // At most a day, so that sums cannot overflow.
-  static Duration bounded(Duration timeout) {
-    return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
-  }
   template <class Value>
   Value read(const Value& value) {
     const std::lock_guard lock(mutex);
@@ -139,23 +134,8 @@ class BlockingLoop {
 
   // Throws std::system_error if the system has no thread left.
   void start(std::function<void()> loop) { thread_ = std::thread(std::move(loop)); }
-  // Unless the loop is closed, runs `shut` on the loop. Joins the thread. Idempotent.
-  void close(std::function<void()> shut);
-
-  // The first step of `shut`. False if already closed; otherwise calls `last` under the lock.
-  template <class Last>
-  bool mark_closed(Last last) {
-    {
-      const std::lock_guard lock(mutex);
-      if (closed) return false;
-      closed = true;
-      last();
-    }
-    news.notify_all();
-    return true;
-  }
-  // The last step of `shut`: the loop runs everything that was posted, then ends.
-  void end_loop();
+  // Closes the boards on the loop, ends the loop, and joins the thread. Idempotent.
+  void close(const std::vector<AsyncBoard*>& boards);
 
   const std::function<void()> on_wait;
   asio::io_context io;
@@ -166,10 +146,14 @@ class BlockingLoop {
 
  protected:
   ~BlockingLoop() = default;
-  // Called under the lock.
+  // Called under the lock: a part has ended; the loop accepts nothing from now on.
   virtual void on_end() {}
+  virtual void on_close() {}
 
  private:
+  // The longest wait of close() for the boards' reports that they are free.
+  static constexpr Duration farewell_limit{100};
+  void shut(const std::vector<AsyncBoard*>& boards);
   void begin(const CallPtr& call, Clock::time_point deadline);
   void end(Call& call, std::size_t part, const CommandResult& result);
   Error blocked_error(std::string_view what, std::string_view instead, std::string_view fix) const;
@@ -177,6 +161,7 @@ class BlockingLoop {
   const Name name_;
   asio::executor_work_guard<asio::io_context::executor_type> work_{io.get_executor()};
   std::thread thread_;
+  std::size_t leaving_ = 0;  // boards that close() waits for
   std::mutex joining_;
 };
 

@@ -17,18 +17,6 @@
 #include "r4link/discovery/url.hpp"
 
 namespace r4 {
-namespace {
-
-// True for a device, which may be plugged in later. A listening port must exist at once.
-bool is_device(const std::string& url) {
-  const std::string scheme = Url::parse(url).scheme();
-  return scheme == "serial" || scheme == "can";
-}
-
-// True if a board obeys every datagram of its transport without a signature.
-bool is_cable(const std::string& board) { return Url::parse(board).scheme() == "serial"; }
-
-}  // namespace
 
 struct Bridge::Impl {
   Impl(std::string_view hosts, std::string_view board, BridgeOptions options)
@@ -48,14 +36,17 @@ struct Bridge::Impl {
                   "choose one: the key (--key, or R4_KEY), or --open");
     }
     for (const BridgedUrls& urls : pair_urls(hosts, board)) {
-      const bool cable = is_cable(urls.board);
+      const std::string scheme = Url::parse(urls.hosts).scheme();
+      // A board obeys every datagram of its cable without a signature.
+      const bool cable = Url::parse(urls.board).scheme() == "serial";
       if (cable && options.keys.empty()) permit(urls, options.open);
       BridgedPair::Setup setup;
       setup.keys = options.keys;
       setup.trusted = cable && !options.open;
       setup.hosts = standard_registry().make(io, urls.hosts, Role::board);
       setup.board = make_host_carrier(io, urls.board, BoardRole::control);
-      setup.hosts_may_be_away = is_device(urls.hosts);
+      // A device may be plugged in later. A listening port must exist at once.
+      setup.hosts_may_be_away = scheme == "serial" || scheme == "can";
       setup.timeout = options.timeout;
       setup.on_event = [this, pair = pairs.size()](BridgeSide side, const CarrierEvent& event) {
         if (on_event) on_event({pair, side, event});
@@ -116,7 +107,6 @@ struct Bridge::Impl {
 
   std::vector<BridgeStatus> collect() const {
     std::vector<BridgeStatus> all;
-    all.reserve(pairs.size());
     for (const auto& pair : pairs) all.push_back(pair->status());
     return all;
   }

@@ -39,6 +39,7 @@ bool has_site_setting(const Datagram& datagram) {
   return false;
 }
 
+// Only an absence, such as of an unplugged device, may end by itself.
 bool is_absence(ErrorKind kind) {
   return kind == ErrorKind::open || kind == ErrorKind::unsupported || kind == ErrorKind::refused;
 }
@@ -46,19 +47,18 @@ bool is_absence(ErrorKind kind) {
 }  // namespace
 
 BridgedPair::BridgedPair(Setup setup)
-    : hosts_may_be_away_(setup.hosts_may_be_away),
-      now_(std::move(setup.now)),
+    : now_(std::move(setup.now)),
       on_event_(std::move(setup.on_event)),
-      hosts_(*this, BridgeSide::hosts, std::move(setup.hosts)),
-      board_(*this, BridgeSide::board, std::move(setup.board)),
+      hosts_(*this, BridgeSide::hosts, std::move(setup.hosts), setup.hosts_may_be_away),
+      board_(*this, BridgeSide::board, std::move(setup.board), true),
       timeout_(setup.timeout),
       known_(setup.timeout),
       guard_(setup.keys, setup.trusted) {}
 
 void BridgedPair::open() {
   const Time now = now_();
-  try_to_open(hosts_, hosts_may_be_away_ ? Failure::throws_unless_absent : Failure::throws, now);
-  try_to_open(board_, Failure::throws_unless_absent, now);
+  try_to_open(hosts_, false, now);
+  try_to_open(board_, false, now);
 }
 
 void BridgedPair::close() noexcept {
@@ -68,7 +68,7 @@ void BridgedPair::close() noexcept {
   }
 }
 
-void BridgedPair::try_to_open(Side& side, Failure failure, Time now) {
+void BridgedPair::try_to_open(Side& side, bool may_fail, Time now) {
   side.tried = now;
   side.waiting.begin(now);
   try {
@@ -76,9 +76,7 @@ void BridgedPair::try_to_open(Side& side, Failure failure, Time now) {
     with_system_errors(side.carrier->name(), [&] { side.carrier->open(side); });
   } catch (const Error& error) {
     side.opened = false;
-    const bool reported = failure == Failure::is_reported ||
-                          (failure == Failure::throws_unless_absent && is_absence(error.kind()));
-    if (!reported) throw;
+    if (!may_fail && !(side.may_be_away && is_absence(error.kind()))) throw;
     if (std::exchange(side.obstacle, error.what()) == error.what()) return;
     side.on_carrier_event({CarrierEvent::Kind::down, error.problem()});
   }
@@ -90,7 +88,7 @@ void BridgedPair::tick() {
     if (side->opened) {
       side->waiting.on_tick(now);
     } else if (now - side->tried >= try_again) {
-      try_to_open(*side, Failure::is_reported, now);
+      try_to_open(*side, true, now);
     }
   }
   follow_hosts(now);

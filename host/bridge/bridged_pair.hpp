@@ -21,7 +21,6 @@
 // one peer to the board. While no host is served, the bridge watches the board (bridge_watch.hpp).
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -80,8 +79,8 @@ class BridgedPair {
 
  private:
   struct Side final : Carrier::Handler {
-    Side(BridgedPair& owner, BridgeSide side, std::unique_ptr<Carrier> by)
-        : pair(owner), which(side), carrier(std::move(by)), end(board_end_of(*carrier)) {}
+    Side(BridgedPair& owner, BridgeSide side, std::unique_ptr<Carrier> by, bool away)
+        : pair(owner), which(side), carrier(std::move(by)), may_be_away(away) {}
     void on_datagram(std::string_view bytes, Peer from) override;
     void on_carrier_event(const CarrierEvent& event) override;
     void on_drained() override { waiting.on_drained(pair.now_()); }
@@ -90,7 +89,8 @@ class BridgedPair {
     BridgedPair& pair;
     const BridgeSide which;
     const std::unique_ptr<Carrier> carrier;
-    BoardEnd& end;
+    const bool may_be_away;  // at first
+    BoardEnd& end = board_end_of(*carrier);
     bool opened = false;
     std::string obstacle;  // why this side could not be opened, as reported last
     Time tried;
@@ -118,11 +118,9 @@ class BridgedPair {
   void pass_on(const Datagram& datagram, Peer from, bool trusted, Time now);
   bool send(Side& to, std::string_view bytes, Priority priority, Peer peer);
   bool is_old(Side& side, Time now);
-  // Only an absence, such as of an unplugged device, may end by itself.
-  enum class Failure : std::uint8_t { throws, throws_unless_absent, is_reported };
-  void try_to_open(Side& side, Failure failure, Time now);
+  // Reports why a side cannot be opened. Throws for a permanent fault, unless `may_fail`.
+  void try_to_open(Side& side, bool may_fail, Time now);
 
-  const bool hosts_may_be_away_;
   const std::function<Time()> now_;
   const std::function<void(BridgeSide, const CarrierEvent&)> on_event_;
   Side hosts_;

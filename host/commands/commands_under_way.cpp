@@ -20,14 +20,14 @@ constexpr Time no_deadline = std::chrono::hours{24};
 
 CommandsUnderWay::CommandsUnderWay(const SessionOptions& options, HostLink& link,
                                    LinkKeeper& keeper, Outbox& outbox, HeardBoard& board,
-                                   const ArmRequests& arming, CommandEnds& ends, Statistics& counts)
+                                   const ArmRequests& arming, Effects& effects, Statistics& counts)
     : options_(options),
       link_(link),
       keeper_(keeper),
       outbox_(outbox),
       board_(board),
       arming_(arming),
-      ends_(ends),
+      effects_(effects),
       counts_(counts),
       pending_(max_pending, max_stops) {}
 
@@ -231,7 +231,7 @@ void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, T
     result.at = pending.step != 0 ? pending.step : pending.failed;
     if (pending.step != 0) result.executed = static_cast<std::uint8_t>(pending.step - 1);
   }
-  ends_.end(pending.ticket, result);
+  effects_.end(pending.ticket, result, counts_);
   if (pending.kind == CommandKind::stop && outcome == Outcome::confirmed) {
     forget_stop();  // at most one stop lingers
     pending.stage = Stage::lingering;

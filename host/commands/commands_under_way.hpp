@@ -30,7 +30,6 @@
 #include "../../protocol/link/host_link.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../arming/arm_requests.hpp"
-#include "../link/command_ends.hpp"
 #include "../link/effects.hpp"
 #include "../link/heard_board.hpp"
 #include "../link/link_keeper.hpp"
@@ -50,7 +49,7 @@ class CommandsUnderWay {
 
   // All references must outlive this.
   CommandsUnderWay(const SessionOptions& options, HostLink& link, LinkKeeper& keeper,
-                   Outbox& outbox, HeardBoard& board, const ArmRequests& arming, CommandEnds& ends,
+                   Outbox& outbox, HeardBoard& board, const ArmRequests& arming, Effects& effects,
                    Statistics& counts);
 
   // --- calls of the program. If there is no room, each call returns 0.
@@ -124,7 +123,7 @@ class CommandsUnderWay {
   Outbox& outbox_;
   HeardBoard& board_;
   const ArmRequests& arming_;
-  CommandEnds& ends_;
+  Effects& effects_;
   Statistics& counts_;
   PendingCommands pending_;
   Ticket next_ticket_ = 1;

@@ -61,7 +61,7 @@ void Posts::on_refusal(const Nack& nack) {
     if (nack.at <= group.size()) refused.at = nack.at;
     if (refused.at != 0) refused.command = group[refused.at - 1U];
   }
-  effects_.report(PostRefused{refused});
+  effects_.report(refused);
 }
 
 const char* to_text(PostResult result) {

@@ -29,12 +29,8 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
 
   void begin() {
     stage_ = Stage::command;
-    const auto send = [this] {
-      deadline_ = impl_.now + timeout_;
-      const Command command = has_step() ? step().command() : Command::fields(Text(fields_));
-      return impl_.session.send(command, timeout_, impl_.now);
-    };
-    impl_.begin(CompletionPtr(this), send, id_);
+    deadline_ = Impl::steady_now() + timeout_;
+    send(has_step() ? step().command() : Command::fields(Text(fields_)), timeout_);
   }
   void complete(const CommandResult& result, How how) override {
     if (result.outcome != Outcome::confirmed) return fail(result, how);
@@ -47,7 +43,7 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
       case Stage::command:
         if (has_step() && step().is_answered()) {
           stage_ = Stage::answer;
-          return wait({Impl::Waits::For::answer, id_, result.pnum, impl_.now, deadline_, nullptr});
+          return wait(Impl::Waits::For::answer, result.pnum, deadline_);
         }
         break;
       case Stage::answer: {
@@ -58,7 +54,7 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
           return fail(failure, how);
         }
         stage_ = Stage::pause;
-        return wait({Impl::Waits::For::time, id_, 0, impl_.now, impl_.now + step().wait, nullptr});
+        return wait(Impl::Waits::For::time, 0, impl_.now + step().wait);
       }
       case Stage::pause:
         break;
@@ -78,10 +74,6 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
   bool has_step() const { return done_ < steps_.size(); }
   const DeviceStep& step() const { return steps_[done_]; }
 
-  void wait(Impl::Waits::Condition condition) {
-    condition.completion.reset(this);
-    impl_.enter(How::post, [&] { impl_.waits.add(std::move(condition)); });
-  }
   void fail(CommandResult result, How how) {
     if (stage_ == Stage::answer && result.outcome == Outcome::timed_out) result.executed = 1;
     result.step = static_cast<std::uint16_t>(done_ + 1);
@@ -99,7 +91,7 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
 };
 
 void AsyncBoard::start_attach(const Device& device, Duration timeout, CompletionPtr completion) {
-  (new AttachSteps(*impl_, device, Impl::time_of(timeout), std::move(completion)))->begin();
+  (new AttachSteps(*impl_, device, bounded(timeout), std::move(completion)))->begin();
 }
 
 namespace {

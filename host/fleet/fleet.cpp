@@ -12,20 +12,7 @@
 
 namespace r4 {
 
-namespace {
-
-std::vector<std::size_t> boards_of(const std::vector<BoardSetpoints>& setpoints) {
-  std::vector<std::size_t> boards;
-  boards.reserve(setpoints.size());
-  for (const BoardSetpoints& each : setpoints) boards.push_back(each.board);
-  return boards;
-}
-
-}  // namespace
-
-bool FleetResults::all_confirmed() const {
-  return std::all_of(results_.begin(), results_.end(), std::mem_fn(&FleetResult::confirmed));
-}
+bool FleetResults::all_confirmed() const { return failed().empty(); }
 
 std::vector<std::size_t> FleetResults::failed() const {
   std::vector<std::size_t> boards;
@@ -125,7 +112,6 @@ FleetResults Fleet::send(const Boards& boards, std::string_view text, Duration t
   const CommandOrGroup what = parse_text(text);
   if (const auto* command = std::get_if<OwnCommand>(&what)) return send(boards, *command, timeout);
   std::vector<BoardSetpoints> setpoints;
-  setpoints.reserve(boards.size());
   for (const std::size_t board : boards) setpoints.push_back({board, std::get<Setpoints>(what)});
   return send(setpoints, timeout);
 }
@@ -147,7 +133,11 @@ FleetResults Fleet::stop(Duration timeout) { return impl_->stop(impl_->all_board
 void Fleet::stop_async() { impl_->stop_async(impl_->all_boards); }
 
 FleetResults Fleet::send(const std::vector<BoardSetpoints>& setpoints, Duration timeout) {
-  for (const BoardSetpoints& each : setpoints) require_any(each.setpoints);
+  Boards boards;
+  for (const BoardSetpoints& each : setpoints) {
+    require_any(each.setpoints);
+    boards.push_back(each.board);
+  }
   require_timeout("send()", timeout);
   require_control(impl_->role, "send()");
   const auto start = [setpoints](AsyncBoard& board, std::size_t part, Duration left, auto end) {
@@ -156,7 +146,7 @@ FleetResults Fleet::send(const std::vector<BoardSetpoints>& setpoints, Duration 
   const auto why = [&](std::size_t part, const CommandResult& result, const LinkStatus& link) {
     return explain(setpoints[part].setpoints, result, link);
   };
-  return impl_->execute("send()", boards_of(setpoints), timeout, start, why);
+  return impl_->execute("send()", boards, timeout, start, why);
 }
 
 std::vector<PostResult> Fleet::post(const std::vector<BoardSetpoints>& setpoints) {

@@ -34,7 +34,6 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
                    ASIO_CONCURRENCY_HINT_UNSAFE_IO, std::exchange(options.on_wait, nullptr)),
       role(options.role),
       urls(urls_of(patterns)) {
-  boards.reserve(urls.size());
   links.resize(urls.size());
   for (std::size_t i = 0; i < urls.size(); ++i) {
     all_boards.push_back(i);
@@ -55,7 +54,9 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
 }
 
 void Fleet::Impl::close() {
-  BlockingLoop::close([this] { shut(); });
+  std::vector<AsyncBoard*> all;
+  for (const auto& board : boards) all.push_back(board.get());
+  BlockingLoop::close(all);
 }
 
 void Fleet::Impl::run() {
@@ -83,14 +84,7 @@ void Fleet::Impl::listen(std::size_t board) {
       notify(std::move(event));
     };
   };
-  const auto report_link = reports(FleetEvent::Kind::link, &FleetEvent::link);
-  async.on_link([this, board, report_link](const LinkStatus& fresh) {
-    {
-      const std::lock_guard lock(mutex);
-      links[board] = fresh;
-    }
-    report_link(fresh);
-  });
+  async.on_link(reports(FleetEvent::Kind::link, &FleetEvent::link));
   async.on_event(reports(FleetEvent::Kind::transport, &FleetEvent::transport));
   async.on_arming(reports(FleetEvent::Kind::arming, &FleetEvent::disarmed_by));
   async.on_refused(reports(FleetEvent::Kind::refused, &FleetEvent::refused));
@@ -100,6 +94,7 @@ void Fleet::Impl::listen(std::size_t board) {
 void Fleet::Impl::notify(FleetEvent event) {
   {
     const std::lock_guard lock(mutex);
+    if (event.kind == FleetEvent::Kind::link) links[event.board] = event.link;
     if (events.size() == most_events) {
       events.pop_front();
       ++missed_events;
@@ -107,16 +102,6 @@ void Fleet::Impl::notify(FleetEvent event) {
     events.push_back(std::move(event));
   }
   news.notify_all();
-}
-
-void Fleet::Impl::shut() {
-  if (!mark_closed([] {})) return;
-  leaving = boards.size();
-  for (const auto& board : boards) {
-    board->async_close(farewell_limit, [this](const CommandResult&) {
-      if (--leaving == 0) end_loop();
-    });
-  }
 }
 
 BoardHealth Fleet::Impl::health_of(std::size_t board) const {

@@ -54,13 +54,11 @@ struct Fleet::Impl final : BlockingLoop {
   void run();
   void listen(std::size_t board);
   void notify(FleetEvent event);
-  void shut();
 
   const BoardRole role;
   std::vector<std::string> urls;
   Boards all_boards;
   std::vector<std::unique_ptr<AsyncBoard>> boards;
-  std::size_t leaving = 0;
 
   // Shared by all threads, under the lock.
   std::vector<LinkStatus> links;

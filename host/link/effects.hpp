@@ -31,18 +31,9 @@ struct Sending {
 
 struct StateCame {};
 struct HeartbeatCame {};
-struct BoardIdentified {
-  Identity identity;
-};
-struct CommandRefused {
-  Nack nack;
-};
 struct BadDatagramCame {
   ReadResult result;
   std::string_view bytes;
-};
-struct LinkChanged {
-  LinkStatus status;
 };
 struct CommandEnded {
   Ticket ticket = 0;
@@ -50,16 +41,10 @@ struct CommandEnded {
 };
 // The board has restarted and kept only its stored settings. Reported before the new state.
 struct BoardRestarted {};
-struct ArmingChanged {
-  DisarmCause cause = DisarmCause::none;
-};
-struct PostRefused {
-  RefusedPost refused;
-};
 // Views in an event point into the last received datagram, and are valid as long as its bytes.
 using SessionEvent =
-    std::variant<StateCame, HeartbeatCame, BoardIdentified, CommandRefused, BadDatagramCame,
-                 LinkChanged, CommandEnded, BoardRestarted, ArmingChanged, PostRefused>;
+    std::variant<StateCame, HeartbeatCame, Identity, Nack, BadDatagramCame, LinkStatus,
+                 CommandEnded, BoardRestarted, DisarmCause, RefusedPost>;
 
 // Memory is reused: in the steady state nothing is allocated.
 class Effects {
@@ -74,6 +59,14 @@ class Effects {
   // The last received datagram, the subject of the events.
   Datagram& datagram() { return datagram_; }
   void report(const SessionEvent& event) { events_.push(event); }
+  // Reports the end of a command, and counts it.
+  void end(Ticket ticket, const CommandResult& result, Statistics& counts) {
+    const Outcome outcome = result.outcome;
+    if (outcome == Outcome::confirmed) ++counts.confirmed;
+    if (outcome == Outcome::timed_out) ++counts.timed_out;
+    if (outcome == Outcome::refused || outcome == Outcome::not_armed) ++counts.refused;
+    report(CommandEnded{ticket, result});
+  }
 
   bool any_sendings() const { return sendings_.any(); }
   // The datagram is copied to `room`, because the session may add datagrams during the sending.

@@ -69,7 +69,7 @@ void LinkKeeper::send_lease(Time now) {
   const bool others = options_.fields != "DEFAULT";
   const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();
   for (std::size_t i = 0; i < paths_.count(); ++i) {
-    Lease& lease = paths_.leases()[i];
+    Lease& lease = paths_.lease(i);
     if ((paths_.speaking() & path_bit(i)) == 0 || !lease.due(now)) continue;
     outbox_.send(Command::watch(options_.watch_rate_hz, list),
                  {.priority = Priority::lease, .paths = path_bit(i), .echo = lease.echo()}, now);
@@ -96,7 +96,7 @@ Time LinkKeeper::next(Time now) const {
   link = std::chrono::floor<std::chrono::milliseconds>(link);
   if (link <= now) link = now + Time{1000};
   Time next = paths_.begun() ? link : Time::max();
-  if (watches()) next = std::min(next, paths_.leases().next(paths_.speaking()));
+  if (watches()) next = std::min(next, paths_.next_lease());
   if (role_.refused(now)) next = std::min(next, role_.refused_until());
   return std::min(next, paths_.next(now));
 }
@@ -104,7 +104,7 @@ Time LinkKeeper::next(Time now) const {
 // Ends the heartbeats: a heartbeat after the farewell would take control again.
 void LinkKeeper::leave(Time now) {
   for (std::size_t i = 0; watches() && i < paths_.count(); ++i) {
-    outbox_.send(Command::watch(0), {.paths = path_bit(i), .echo = paths_.leases()[i].echo()}, now);
+    outbox_.send(Command::watch(0), {.paths = path_bit(i), .echo = paths_.lease(i).echo()}, now);
   }
   leaving_ = true;
 }
@@ -143,7 +143,7 @@ bool LinkKeeper::in_control(Time now) const {
 
 LinkStatus LinkKeeper::status(ChipFault fault, Time now) const {
   const bool heard = is_heard(link_.state());
-  LinkCauses causes = watches() ? paths_.leases().causes(now) : LinkCauses();
+  LinkCauses causes = watches() ? paths_.lease_causes(now) : LinkCauses();
   causes.set(LinkCause::transport_down, transport_down_);
   causes.set(heard ? LinkCause::other_board : LinkCause::two_boards, paths_.two_boards());
   causes.set(LinkCause::foreign_frames, trouble_ == TransportTrouble::foreign_frames);

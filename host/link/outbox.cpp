@@ -34,29 +34,27 @@ Outbox::Sent Outbox::send(const Setpoints& group, Time now) {
   return {pnum, send(writer, group[0].kind, pnum, {}, now)};
 }
 
+// Signs for each path separately (docs/reference/protocol.md, "Paths"). A watcher's datagrams need
+// no signature.
 PathSet Outbox::send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, Way way,
                      Time now) {
   if (kind == CommandKind::stop) way.priority = Priority::stop;
   const bool to_any = way.unknown_too || kind == CommandKind::stop;
   if (key_.refuses_board() && !to_any) return 0;
   const PathSet to = to_any ? way.paths : static_cast<PathSet>(way.paths & paths_.speaking());
+  const std::size_t size = writer.size();
   PathSet over = 0;
   for (std::size_t i = 0; i < paths_.count(); ++i) {
     if ((to & path_bit(i)) == 0) continue;
-    if (send_over(i, writer, kind, pnum, way.priority, now)) over |= path_bit(i);
+    if (!watches()) key_.sign(writer, now);
+    const Text bytes = writer.finish();
+    if (!bytes.empty()) {  // not too long
+      effects_.send(i, way.priority, kind, pnum, {bytes.data(), bytes.size()});
+      over |= path_bit(i);
+    }
+    writer.truncate(size);
   }
   return over;
-}
-
-// Signs for each path (docs/reference/protocol.md, "Paths"). False if the datagram is too long.
-bool Outbox::send_over(std::size_t path, DatagramWriter& writer, CommandKind kind,
-                       std::uint32_t pnum, Priority priority, Time now) {
-  const std::size_t size = writer.size();
-  if (!watches()) key_.sign(writer, now);
-  const Text bytes = writer.finish();
-  if (!bytes.empty()) effects_.send(path, priority, kind, pnum, {bytes.data(), bytes.size()});
-  writer.truncate(size);
-  return !bytes.empty();
 }
 
 void Delivery::begin(Outbox::Sent sent) {

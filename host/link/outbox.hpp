@@ -53,9 +53,6 @@ class Outbox {
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
 
  private:
-  bool send_over(std::size_t path, DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
-                 Priority priority, Time now);
-
   Effects& effects_;
   HostLink& link_;
   HostKey& key_;

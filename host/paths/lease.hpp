@@ -14,11 +14,8 @@
 //               may replace it
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "../measurement/time.hpp"
 #include "r4link/link.hpp"
@@ -65,35 +62,6 @@ class Lease {
   Time next_{0};
   Time heard_{0};
   std::uint32_t echo_ = 0;
-};
-
-class Leases {
- public:
-  explicit Leases(std::size_t paths) : leases_(paths) {}
-
-  Lease& operator[](std::size_t path) { return leases_[path]; }
-  bool streaming(Time now) const {
-    return std::any_of(leases_.begin(), leases_.end(),
-                       [now](const Lease& lease) { return lease.streaming(now); });
-  }
-  LinkCauses causes(Time now) const {
-    LinkCauses all;
-    if (streaming(now)) return all;
-    for (const Lease& lease : leases_) {
-      if (const auto cause = lease.cause(now)) all.set(*cause);
-    }
-    return all;
-  }
-  Time next(std::uint8_t paths) const {
-    Time next = Time::max();
-    for (std::size_t i = 0; i < leases_.size(); ++i) {
-      if ((paths & 1U << i) != 0) next = std::min(next, leases_[i].next());
-    }
-    return next;
-  }
-
- private:
-  std::vector<Lease> leases_;
 };
 
 }  // namespace r4

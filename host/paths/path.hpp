@@ -9,6 +9,7 @@
 
 #include "../measurement/identity_question.hpp"
 #include "../measurement/time.hpp"
+#include "lease.hpp"
 
 namespace r4 {
 
@@ -74,6 +75,7 @@ struct Path {
   Time heard_until{0};
   PathQuestions questions;
   PathBusy busy;
+  Lease lease;
   std::string board_id;
 };
 

@@ -75,10 +75,9 @@ bool PathNews::is_newest(std::size_t path, std::uint32_t t_ms) {
 // The board answers a duplicate of a command with the first answer, or with DUPLICATE.
 bool PathNews::is_copy(const Nack& nack) {
   if (nack.code == Refusal::duplicate) return true;
-  for (const Told& each : told_) {
-    if (each.pnum == nack.pnum && each.code == nack.code) return true;
-  }
-  told_[answers_++ % told_.size()] = {nack.pnum, nack.code};
+  const std::pair answer(nack.pnum, nack.code);
+  if (std::find(told_.begin(), told_.end(), answer) != told_.end()) return true;
+  told_[answers_++ % told_.size()] = answer;
   return false;
 }
 

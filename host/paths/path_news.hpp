@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "../../protocol/datagram/wrapping.hpp"
@@ -79,11 +80,7 @@ class PathNews {
     FieldSet fields;  // of all states with the T of `state`
   } newest_;
   PacketCounters counters_;
-  struct Told {
-    std::uint32_t pnum = 0;
-    Refusal code = Refusal::none;
-  };
-  std::array<Told, 16> told_{};  // the newest answers
+  std::array<std::pair<std::uint32_t, Refusal>, 16> told_{};  // the newest answers
   std::size_t answers_ = 0;
 };
 

@@ -37,7 +37,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   if (!up) return;
   // Numbers may restart, and a lease may have ended.
   news_.restart(index);
-  leases_[index].renew(now);
+  path.lease.renew(now);
 }
 
 void Paths::on_sleep(Time now) {
@@ -50,7 +50,7 @@ void Paths::on_sleep(Time now) {
     if (path.up && path.can_ask && (path.questions.answered || !path.known))
       path.questions.ask_at = now;
     news_.restart(i);
-    leases_[i].renew(now);
+    path.lease.renew(now);
   }
   clock_.forget();
   news_.forget();
@@ -212,8 +212,9 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
     if (!fits(path, t_ms, now)) {
       // The board has restarted if this path has carried and no other path carries.
       const bool carried = path.clock.known() && path.boot == boot_;
+      const bool others_carry = (carrying(now) & ~path_bit(index)) != 0;
       if (!carried && !anew_) turn_away(path);
-      if ((!carried && !anew_) || others_carry(path, now)) return Admission::no;
+      if ((!carried && !anew_) || others_carry) return Admission::no;
       begin_boot(t_ms, now);
       proven_ = now;
       admission = Admission::restarted;
@@ -240,7 +241,8 @@ bool Paths::admit_connecting(std::size_t index, Time now) {
   }
   const bool believed = is_believed(path);
   if (!believed) ask_soon(path, now);
-  if (!begun_ || !all_connecting(now)) return false;
+  const auto lives = [now](const Path& each) { return is_heard(each, now) && !each.connecting; };
+  if (!begun_ || those(lives) != 0) return false;
   const bool recent =
       link_.echo() != 0 && r4::is_heard(link_.state()) && clock_.known() &&
       -clock_.ahead(link_.echo(), now) <= static_cast<std::int32_t>(to_ms(timeout_));
@@ -275,14 +277,21 @@ bool Paths::is_newest(std::size_t index, std::uint32_t t_ms, Time now) {
   return true;
 }
 
-bool Paths::all_connecting(Time now) const {
-  return std::all_of(paths_.begin(), paths_.end(),
-                     [&](const Path& path) { return path.connecting || !is_heard(path, now); });
+Time Paths::next_lease() const {
+  Time next = Time::max();
+  for (std::size_t i = 0; i < paths_.size(); ++i) {
+    if ((speaking() & path_bit(i)) != 0) next = std::min(next, paths_[i].lease.next());
+  }
+  return next;
 }
 
-bool Paths::others_carry(const Path& path, Time now) const {
-  return std::any_of(paths_.begin(), paths_.end(),
-                     [&](const Path& each) { return &each != &path && is_heard(each, now); });
+LinkCauses Paths::lease_causes(Time now) const {
+  LinkCauses all;
+  if (streaming(now)) return all;
+  for (const Path& path : paths_) {
+    if (const auto cause = path.lease.cause(now)) all.set(*cause);
+  }
+  return all;
 }
 
 void Paths::on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now) {

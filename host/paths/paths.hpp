@@ -31,7 +31,6 @@
 
 #include "../../protocol/link/host_link.hpp"
 #include "../../protocol/messages/message.hpp"
-#include "lease.hpp"
 #include "path.hpp"
 #include "path_news.hpp"
 #include "r4link/link.hpp"
@@ -45,8 +44,7 @@ class Paths {
       : paths_(count),
         timeout_(std::chrono::milliseconds{timing.timeout_ms}),
         link_(link),
-        news_(count),
-        leases_(count) {}
+        news_(count) {}
 
   std::size_t count() const { return paths_.size(); }
 
@@ -99,8 +97,15 @@ class Paths {
   bool all_busy(Time now) const;
   Time all_busy_until(Time now) const;
 
-  Leases& leases() { return leases_; }
-  const Leases& leases() const { return leases_; }
+  // --- a watcher's leases
+
+  Lease& lease(std::size_t index) { return paths_[index].lease; }
+  // When the next lease is due.
+  Time next_lease() const;
+  bool streaming(Time now) const {
+    return those([now](const Path& path) { return path.lease.streaming(now); }) != 0;
+  }
+  LinkCauses lease_causes(Time now) const;
 
   PathSet carrying(Time now) const {
     return those([now](const Path& path) { return is_heard(path, now); });
@@ -154,8 +159,6 @@ class Paths {
   static void ask_soon(Path& path, Time now);
   void compare_those_that_listen(std::uint32_t t_ms, Time now);
   static void turn_away(Path& path);
-  bool all_connecting(Time now) const;
-  bool others_carry(const Path& path, Time now) const;
   bool refuses(const Path& path, Time now) const;
   PathState state(const Path& path, Time now) const;
 
@@ -175,7 +178,6 @@ class Paths {
   };
   std::optional<OwnState> own_;
   PathNews news_;
-  Leases leases_;
 };
 
 }  // namespace r4

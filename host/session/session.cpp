@@ -44,9 +44,8 @@ Session::Session(SessionOptions options, BoardRole role, std::size_t paths,
       board_(options_.identify_interval),
       outbox_(effects_, link_, key_, paths_, role),
       keeper_(options_, link_, key_, paths_, outbox_, statistics_.counts),
-      ends_(effects_, statistics_.counts),
-      arming_(options_.arming, effects_, ends_),
-      commands_(options_, link_, keeper_, outbox_, board_, arming_, ends_, statistics_.counts),
+      arming_(options_.arming, effects_, statistics_.counts),
+      commands_(options_, link_, keeper_, outbox_, board_, arming_, effects_, statistics_.counts),
       posts_(effects_, outbox_, statistics_.counts) {
   begin_session();
   if (options_.fields.empty()) return;
@@ -90,7 +89,7 @@ void Session::refresh(Time now) {
   const LinkStatus fresh = keeper_.status(board_.state().fault, now);
   if (fresh == status_) return;
   status_ = fresh;
-  effects_.report(LinkChanged{status_});
+  effects_.report(status_);
 }
 
 void Session::on_sent(const Sending& sending, SendResult result, Time now) {

@@ -21,7 +21,6 @@
 #include "../arming/arm_requests.hpp"
 #include "../commands/commands_under_way.hpp"
 #include "../commands/posts.hpp"
-#include "../link/command_ends.hpp"
 #include "../link/effects.hpp"
 #include "../link/heard_board.hpp"
 #include "../link/host_key.hpp"
@@ -70,9 +69,9 @@ class Session {
   // --- commands. CommandEnded reports the end, at most `timeout` after `now`.
 
   // Throws Error{usage} for a command outside its ranges. Returns 0 if 64 commands are under way.
-  // Command::identify(): the answer confirms the command, and BoardIdentified follows.
-  // Command::stop(): cancels all other commands, and is confirmed when the board reports this
-  // stop's number. If 16 stops are under way, returns 0 but sends the stop.
+  // Command::identify(): the answer confirms it, and an Identity is reported. Command::stop():
+  // cancels all other commands, and is confirmed when the board reports this stop's number. If 16
+  // stops are under way, returns 0 but sends the stop.
   Ticket send(const Command& command, Time timeout, Time now);
   // Commands run together or, without groups, singly. Throws Error{usage} for an empty group.
   Ticket send(const Setpoints& group, Time timeout, Time now);
@@ -93,7 +92,8 @@ class Session {
   void cancel(Ticket ticket, Time now);
   void end_all(Time now);
 
-  // PostRefused reports a refusal. After `sent`, perform the effects, then call posted().
+  // Sends once; RefusedPost reports a refusal. After `sent`, perform the effects, then call
+  // posted().
   PostResult post(const Command& command, Time now);
   // Until the board has reported whether it executes groups, also returns no_link.
   PostResult post(const Setpoints& group, Time now);
@@ -124,8 +124,7 @@ class Session {
   void on_heartbeat(std::size_t path, const Datagram& datagram, Time now);
   void on_identity(std::size_t path, const Datagram& datagram, Time now);
   void on_refusal(std::size_t path, const Datagram& datagram, Time now);
-  void on_lease_refused(std::size_t path, const Nack& nack, Time now);
-  bool counts(const Identity& identity) const;
+  bool admitted(Paths::Admission admission, Time now);
   bool is_proof(const Nack& nack) const;
 
   PostResult gate_of_posts(CommandKind kind, Time now);
@@ -151,7 +150,6 @@ class Session {
   HeardBoard board_;
   Outbox outbox_;
   LinkKeeper keeper_;
-  CommandEnds ends_;
   ArmRequests arming_;
   CommandsUnderWay commands_;
   Posts posts_;

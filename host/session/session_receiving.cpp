@@ -32,13 +32,16 @@ void Session::receive(std::size_t path, std::string_view bytes, Time now) {
   }
 }
 
+bool Session::admitted(Paths::Admission admission, Time now) {
+  if (admission == Paths::Admission::restarted) on_restart(now);
+  return admission != Paths::Admission::no;
+}
+
 void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  const Paths::Admission admission = paths_.admit(path, datagram.pnum(), t_ms, now);
-  if (admission == Paths::Admission::no) return;
-  if (admission == Paths::Admission::restarted) on_restart(now);
+  if (!admitted(paths_.admit(path, datagram.pnum(), t_ms, now), now)) return;
   link_.on_heard(to_ms(now));
-  paths_.leases()[path].on_state(now);
+  paths_.lease(path).on_state(now);
   if (!paths_.news().is_newest_state(path, t_ms)) return refresh(now);
   ReceivedState fresh = state();
   if (!read_state(datagram, fresh)) {
@@ -82,12 +85,11 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
   bool taken = false;
   if (booting) {
     // On a bus, a watcher also receives this heartbeat for hosts, and uses the states instead.
-    const bool for_hosts = watches() && paths_.leases().streaming(now);
+    const bool for_hosts = watches() && paths_.streaming(now);
     taken = !for_hosts && paths_.admit_connecting(path, now);
   } else {
-    const Paths::Admission admission = paths_.admit(path, datagram.pnum(), t_ms, now);
-    if (admission == Paths::Admission::restarted) on_restart(now);
-    taken = admission != Paths::Admission::no && paths_.news().take_heartbeat(path, t_ms);
+    taken = admitted(paths_.admit(path, datagram.pnum(), t_ms, now), now) &&
+            paths_.news().take_heartbeat(path, t_ms);
   }
   if (!taken) {
     if (paths_.is_known(path)) commands_.on_stop(report, now);  // the stop's number proves the stop
@@ -119,24 +121,19 @@ void Session::on_identity(std::size_t path, const Datagram& datagram, Time now) 
   if (!read_identity(datagram, identity)) return;
   if (!watches() && identity.sid != outbox_.session_id()) return;
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  const Paths::Admission admission = paths_.admit_identity(path, identity, t_ms, now);
-  if (admission == Paths::Admission::no) return refresh(now);
-  if (admission == Paths::Admission::restarted) on_restart(now);
-  paths_.admit_answer(path, datagram.pnum(), t_ms, counts(identity), now);
-  if (counts(identity)) link_.on_heard(to_ms(now));
+  if (!admitted(paths_.admit_identity(path, identity, t_ms, now), now)) return refresh(now);
+  // Answers to hosts without control are not numbered with the states.
+  const bool to_watcher = watches() && identity.sid == no_session;
+  const bool counts = to_watcher || !(identity.has_busy && identity.busy);
+  paths_.admit_answer(path, datagram.pnum(), t_ms, counts, now);
+  if (counts) link_.on_heard(to_ms(now));
   keeper_.fields().on_answer();
   if (const auto asked = board_.on_identity(identity, t_ms, now)) {
     statistics_.on_round_trip(now - *asked);
   }
-  effects_.report(BoardIdentified{identity});
+  effects_.report(identity);
   refresh(now);
   commands_.on_identity(identity, now);
-}
-
-// True if the answer is numbered with the states. Hosts without control get separate numbers.
-bool Session::counts(const Identity& identity) const {
-  const bool to_watcher = watches() && identity.sid == no_session;
-  return to_watcher || !(identity.has_busy && identity.busy);
 }
 
 void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
@@ -151,7 +148,11 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   }
   link_.on_heard(to_ms(now));
   if (watches()) {
-    on_lease_refused(path, nack, now);
+    // A board refuses no other command of a watcher. The link's status reports the codes below.
+    paths_.lease(path).on_refusal(nack, now);
+    const bool in_status =
+        nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
+    if (!in_status) effects_.report(nack);
     return refresh(now);
   }
   keeper_.fields().on_answer();
@@ -161,7 +162,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   }
   const bool not_taken = nack.code == Refusal::auth && !commands_.is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
-  if (!paths_.news().is_copy(nack)) effects_.report(CommandRefused{nack});
+  if (!paths_.news().is_copy(nack)) effects_.report(nack);
   // AUTH refuses one duplicate. A repetition or a duplicate on another path may have been executed.
   const bool others = (paths_.speaking() & ~path_bit(path)) != 0;
   const bool other_copy = nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
@@ -170,14 +171,6 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   take_step_end(now);
   if (proof) posts_.on_refusal(nack);
   refresh(now);
-}
-
-// The board refuses no other command of a watcher. The link's status reports the codes below.
-void Session::on_lease_refused(std::size_t path, const Nack& nack, Time now) {
-  paths_.leases()[path].on_refusal(nack, now);
-  const bool in_status =
-      nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
-  if (!in_status) effects_.report(CommandRefused{nack});
 }
 
 // True if the refusal proves that the command was not executed. The board remembers a limited

@@ -116,14 +116,14 @@ class DrivenSession : public Session {
   }
   void notify(const StateCame&) { handler_.on_state(state(), effects().datagram()); }
   void notify(const HeartbeatCame&) { handler_.on_board_heartbeat(effects().datagram()); }
-  void notify(const BoardIdentified& event) { handler_.on_identity(event.identity); }
-  void notify(const CommandRefused& event) { handler_.on_nack(event.nack, effects().datagram()); }
+  void notify(const Identity& identity) { handler_.on_identity(identity); }
+  void notify(const Nack& nack) { handler_.on_nack(nack, effects().datagram()); }
   void notify(const BadDatagramCame& event) { handler_.on_bad_datagram(event.result, event.bytes); }
-  void notify(const LinkChanged& event) { handler_.on_link(event.status); }
+  void notify(const LinkStatus& status) { handler_.on_link(status); }
   void notify(const CommandEnded& event) { handler_.on_result(event.ticket, event.result); }
   void notify(const BoardRestarted&) { handler_.on_restart(); }
-  void notify(const ArmingChanged& event) { handler_.on_arming(event.cause); }
-  void notify(const PostRefused& event) { handler_.on_refused(event.refused); }
+  void notify(DisarmCause cause) { handler_.on_arming(cause); }
+  void notify(const RefusedPost& refused) { handler_.on_refused(refused); }
 
   Handler& handler_;
 };
