@@ -92,7 +92,7 @@ class BoardHardware final : public Hal {
   ChipFault fault() const { return fault_; }
   ChipTrouble trouble(Chip chip) const { return chips_[static_cast<int>(chip)]->trouble(); }
 
-  // For interrupts. Channels count from 1.
+  // For interrupts. Channels are numbered from 1.
   void step_tick() {
     for (Stepper& stepper : steppers_) stepper.tick();
   }

@@ -44,7 +44,7 @@ class Guard {
   // E:STOP has arrived in an interrupt or a thread that does not wait for the loop
   // (stop_detector.hpp). The next tick(), which may follow at once, makes the outputs safe.
   void stop() { stops_heard_.fetch_add(1, std::memory_order_release); }
-  // Calls of stop() since boot; wraps. The application must read as many stop datagrams.
+  // Calls of stop() since boot; wraps. For each call, the application must read a stop datagram.
   std::uint32_t stops_heard() const { return stops_heard_.load(std::memory_order_acquire); }
 
   // True if every duty has checked in since tick() last returned true: the watchdog may be fed.

@@ -26,8 +26,8 @@ class Port {
   virtual bool reaches(Peer peer) const { return peer == everyone; }
   // `wanted` is the setting `pack`: the port (CAN) sends the packed form if the host uses it.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
-  // True for a bus (CAN): all programs on the bus receive what the port sends, and no other program
-  // does. So a watcher need not prove its peer.
+  // True for a bus (CAN): all programs on the bus receive the port's datagrams, and no program
+  // elsewhere receives the datagrams. So a watcher need not prove its address with a LEASE number.
   virtual bool is_bus() const { return false; }
   // True for the board's own cable, from which site settings are accepted (site_settings.hpp).
   virtual bool may_configure() const { return false; }

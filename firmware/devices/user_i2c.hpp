@@ -29,7 +29,7 @@ class UserI2c {
 
   // Begins a valid X:READ, X:WRITE or X:SCAN. False if the previous command has not ended.
   bool ask(std::uint32_t pnum, const Command& command);
-  // Slots count from 1; a poll that is not on ends the slot. Discards the slot's last reading.
+  // Slots are numbered from 1. If `poll` is off, the slot ends. Discards the slot's last reading.
   void poll_slot(int slot, const I2cPoll& poll, std::uint32_t now_ms);
   // The board is safe: cancels a write that has not begun, because it may move something.
   void drop_write();

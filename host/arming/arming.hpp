@@ -40,7 +40,7 @@ class ArmingMachine {
   DisarmCause cause() const { return cause_; }
 
   void disarm(DisarmCause cause);
-  // The newest reason of the board to be safe.
+  // The board's newest reason for the safe state.
   void on_reason(SafeReason reason);
   // The board reports the reason under this session's control.
   void on_heard(SafeReason reason);

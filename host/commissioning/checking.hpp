@@ -53,7 +53,7 @@ class Checking {
   void move(const std::string& text, const Command& command, const std::optional<Command>& rest,
             Duration most, const std::function<void(const ReceivedState&)>& on_state = {});
   // Calls `act` with relay 1 closed and the key held, then sets the output to `rest`, if any, and
-  // opens relay 1. `act` must return when watch() is false or the movement has ended.
+  // opens relay 1. When watch() is false or the movement has ended, `act` must return.
   void hold(const Movement& movement, const std::optional<Command>& rest,
             const std::function<void()>& act);
   // Waits for the next state while something moves. False if the person released the key, or the

@@ -27,7 +27,7 @@ std::string_view scheme_of(const FoundBoard& board) {
   return std::string_view(board.url).substr(0, board.url.find(':'));
 }
 
-// True if all entries are one board, which each transport found once.
+// True if all entries are the same board, and no two entries have the same transport.
 bool are_one(const std::vector<FoundBoard>& boards) {
   std::set<std::string_view> schemes;
   return std::all_of(boards.begin(), boards.end(), [&](const FoundBoard& each) {

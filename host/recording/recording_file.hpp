@@ -20,7 +20,7 @@ class RecordingFile {
   // recording. Throws Error for a file that cannot be written or is not a recording.
   explicit RecordingFile(std::string path);
 
-  // Writes all bytes to the disk. Throws Error. Removes the bytes of an incomplete write.
+  // Writes all bytes to the disk. If that fails, removes an incomplete write and throws Error.
   void append(std::string_view bytes);
 
   // moved: the path leads to another file or to no file.

@@ -338,7 +338,7 @@ class R4LINK_API Board {
   // Sets an output voltage, channel 1 or 2, 0-3300 mV; 0 in the safe state.
   void dac(Channel channel, Millivolts voltage, Duration timeout = default_timeout);
 
-  // Channels count from 1, as on the board. A channel that the board lacks throws when it is used.
+  // Channels are numbered from 1, as on the board. If the board lacks the channel, its use throws.
   DriveChannel osmc(int channel) { return {*this, CommandKind::osmc, channel}; }
   DriveChannel dhb12(int channel) { return {*this, CommandKind::dhb12, channel}; }
   ServoChannel servo(int channel) { return {*this, channel}; }

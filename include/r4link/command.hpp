@@ -99,7 +99,7 @@ struct R4LINK_API Command {
   static Command bldc(Channel channel, Duty duty, bool brake = false) {
     return bldc(channel, duty.pwm(), duty.direction(), brake);
   }
-  // The board goes safe if the ultrasonic sensor measures less than `threshold`, 1-400 cm; 0: off.
+  // If the ultrasonic sensor measures less than `threshold`, the board goes safe. 1-400 cm; 0: off.
   static Command proximity(Channel channel, Centimetres threshold);
   static Command fields(Text list);
   static Command setting(Text key, Text value);

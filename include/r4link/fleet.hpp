@@ -129,8 +129,8 @@ class R4LINK_API Fleet {
   static constexpr Duration default_timeout{1000};
 
   // Opens all transports and starts the links, without waiting for the boards. callback_limit has
-  // no effect; waiting calls call on_wait. Throws Error for a wrong URL or pattern, for a
-  // duplicate, and for the first transport that cannot be opened.
+  // no effect. Functions that wait call on_wait. Throws Error for a wrong URL or pattern, for a
+  // duplicate URL, and for the first transport that cannot be opened.
   explicit Fleet(const std::vector<std::string>& patterns, BoardOptions options = {});
   ~Fleet();
   Fleet(const Fleet&) = delete;

@@ -127,7 +127,7 @@ struct State {
 
   // True if the dead-man's handle is held, or if the board has none.
   bool handle_held() const { return handle != Handle::released; }
-  // For the functions below, channels count from 1. A channel that does not exist reads 0.
+  // Channels are numbered from 1 in the functions below. A channel that does not exist reads 0.
   double volts(Analog input) const {
     const int i = static_cast<int>(input);
     return i < analog_channels ? raw.analog_cv[i] / 100.0 : 0.0;

@@ -62,7 +62,7 @@ WiringFault fault_of(const SignalRow& row, Place place, bool at_second_bus) {
   return WiringFault::none;
 }
 
-// Kinds of places that are numbered together.
+// Places of one family share one numbering: two signals of a family must not share a number.
 enum class Family : std::uint8_t { bus, address, pin, line, dac_output, expander_bit };
 
 Family family_of(Terminal terminal) {

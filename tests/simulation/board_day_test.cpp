@@ -234,8 +234,8 @@ class Day final : private firmware::Port {
     ended_ms_ = passed_ms_;
   }
   // True if every output that the board can reach is off. A chip that does not answer keeps its
-  // outputs, and each chip on a held bus keeps its outputs. For these outputs there are the relay
-  // of the dead-man's handle and the emergency switch.
+  // outputs, and each chip on a held bus keeps its outputs. The relay of the dead-man's handle and
+  // the emergency switch cut the supply of these outputs.
   bool all_off() {
     sim::ChipPins pins = board_.pins();
     const sim::ChipPins safe = sim::ChipPins::safe();

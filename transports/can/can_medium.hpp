@@ -29,7 +29,7 @@ class CanMedium {
   enum class Outcome : std::uint8_t {
     done,
     busy,    // the socket's share of the queue is used up: wait until the socket is writable
-    full,    // the interface's queue is full; the system does not report when it has room
+    full,    // the interface's queue is full; the system does not report room in the queue
     failed,  // with errno
   };
 

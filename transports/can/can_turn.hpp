@@ -58,7 +58,7 @@ class CanTurn {
 
   std::minstd_rand chance_;
   State state_ = State::ours;
-  Time until_;  // when the turn becomes ours, if it is not ours
+  Time until_;  // unless the state is `ours`: when the state becomes `ours`
   bool speaking_ = false;
   Time since_;  // when this host began to send
   Time last_;   // when this host last sent

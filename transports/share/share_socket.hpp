@@ -22,14 +22,16 @@ namespace r4 {
 
 // Binds the holder's name for `role`. None, with errno: EADDRINUSE if another program has the name.
 FileDescriptor take_share_name(const ShareName& name, BoardRole role);
-// Connects to a holder. None, with errno: ECONNREFUSED (no holder), would_block() (too many wait).
+// Connects to a holder. None, with errno: ECONNREFUSED (the transport has no holder), or
+// would_block() (too many programs wait).
 FileDescriptor connect_to_holder(const ShareName& name, BoardRole role);
 // The next connection that waits at a holder. None, with errno.
 FileDescriptor accept_sharer(int holder);
 
 inline bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
-// True if the other end's user is the same or, if a group shares the transport, a member or root.
+// True if the other end has the user of this program. If a group shares the transport, also true
+// for members of the group and for root.
 bool is_one_of_us(int connection, const ShareName& name);
 pid_t process_of(int connection);
 // The program's name, as in "r4"; "another program" if it cannot be read.

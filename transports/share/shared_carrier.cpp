@@ -321,7 +321,7 @@ void SharedCarrier::on_oversize(std::string_view beginning) {
 void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   name_ = own_->name();
   tell(event);
-  // Another device may get that path at once.
+  // Another device may get the same device path immediately.
   const bool is_gone = event.kind == CarrierEvent::Kind::down && share_.is_path;
   if (is_gone && state_ == State::holding) lose();
 }

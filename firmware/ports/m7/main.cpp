@@ -96,7 +96,8 @@ int main() {
   link.start();
   if (!udp.start()) Log(uart1_base).text("r4: no Ethernet: UDP is off\n");
 
-  give_way(Irq::timer1);  // the safe state takes longer than a byte
+  // The handler of timer 1 may make the outputs safe, which takes longer than a UART byte.
+  give_way(Irq::timer1);
   enable(Irq::uart0_rx);
   enable(Irq::uart0_tx);
   enable(Irq::timer1);

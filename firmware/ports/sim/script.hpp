@@ -67,8 +67,9 @@ struct ScriptStep {
   // ultrasonic, encoder, motor, uart, gpio: 1 …; analog, divider: an Analog; defect: one of
   // defects::Index; chip: a Chip; device: a UserDevice, then an index into OptionalDevices
   int channel = 0;
-  // 1: held, stalled, high, broken; ultrasonic: cm, off; encoder: counts; analog: 0.01 V; divider:
-  // hundredths; chip, device: a Supply; hang: ms; user_bus: its Fault; uart: a UartPeer
+  // handle, i2c: 1 is held; motor: 1 is stalled; gpio: 1 is high; defect: 1 is broken; ultrasonic:
+  // cm, or `off`; encoder: counts; analog: 0.01 V; divider: hundredths; chip, device: a Supply;
+  // hang: ms; user_bus: its Fault; uart: a UartPeer
   std::int32_t value = 0;
   std::string text;  // the line without its time, "handle released"
 };

@@ -32,8 +32,8 @@ struct PidOptions {
 
 class R4LINK_API Pid {
  public:
-  // Throws Error{usage} for a gain, limit or filter that is not finite, for minimum >= maximum, for
-  // a rate that is not above 0, and for a negative filter.
+  // Throws Error{usage} if a gain, limit or filter is not finite, minimum >= maximum, the rate is
+  // not above 0, or the filter is negative.
   explicit Pid(const PidOptions& options);
 
   // The output, `dt_s` seconds after the last step. If dt_s is not above 0, the output is

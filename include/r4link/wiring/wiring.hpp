@@ -54,7 +54,7 @@ static_assert(signals::dac_chip - signals::osmc_chip == static_cast<int>(Chip::d
 struct SignalRow {
   Terminal terminal;
   std::uint8_t first;     // index of channel 1
-  std::uint8_t channels;  // channels count from 1
+  std::uint8_t channels;  // numbered from 1
   SignalKind partner;     // both are connected or neither; itself: no partner
   bool has_option;
 };

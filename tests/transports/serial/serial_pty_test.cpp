@@ -55,7 +55,7 @@ FileDescriptor open_raw(const std::string& device) {
   return terminal;
 }
 
-// All bytes that can be read at once.
+// All bytes that can be read without waiting.
 std::string read_all(const FileDescriptor& terminal) {
   std::string all;
   std::array<char, 4096> buffer{};
@@ -525,7 +525,7 @@ TEST_F(SerialPtyTest, LeaksNoDescriptorsOver30Reopenings) {
   EXPECT_LE(open_descriptors(), before);
 }
 
-// The program may control a board, so it must continue and try again.
+// The host gets an error. The board must continue: it reports one warning and tries again.
 TEST_F(SerialPtyTest, ARefusedWatchIsAHostErrorAndABoardWarning) {
   in_a_thread_of_its_own([&] {
     open_board();

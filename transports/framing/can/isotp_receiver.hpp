@@ -85,8 +85,8 @@ class IsotpReceiver {
   IsotpError poll(std::uint32_t now_us) {
     return state_ == State::idle || !reached(now_us, deadline_us_) ? IsotpError::none : time_out();
   }
-  // While held, sends wait instead of clear to send, max_waits times; then the transfer ends (9.7).
-  // No effect on a sender that is already clear to send.
+  // While held, answers with `wait` instead of `clear_to_send`. After max_waits such answers the
+  // transfer ends (9.7). If the sender already has `clear_to_send`, hold() does not stop it.
   void hold(bool held, std::uint32_t now_us);
   void cancel();
 

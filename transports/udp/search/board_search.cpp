@@ -282,7 +282,8 @@ FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted) {
   std::vector<AnsweredBoard> meant = result.boards;
   if (!wanted.called.empty()) meant = called(result.boards, wanted.called);
   if (!wanted.board_id.empty()) {
-    // Only the board found before: among boards of one name, and if the URL names no board.
+    // If the URL names no board, or the board found before has the name in the URL, only the board
+    // found before is meant.
     std::vector<AnsweredBoard> same = meant;
     std::erase_if(same,
                   [&](const AnsweredBoard& each) { return each.board_id != wanted.board_id; });

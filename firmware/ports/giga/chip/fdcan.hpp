@@ -62,7 +62,8 @@ class Fdcan {
   bool send_urgent(const CanFrame& frame);
 
   enum class Event : std::uint8_t { none, bus_off, stale };
-  // bus_off: the bus was left; stale: nothing was sent for stale_us. Both drop all waiting frames.
+  // bus_off: the controller left the bus; stale: nothing was sent for stale_us. In both cases all
+  // waiting frames are dropped.
   Event poll(std::uint32_t now_us);
   // Call in the controller's interrupt, to clear it. True: an emergency stop waits in FIFO 1.
   bool on_interrupt();

@@ -22,7 +22,7 @@ struct BoardChips {
   void power_on();
   // A brake without a line is on while its motor is stopped.
   ChipPins pins() const;
-  // Channels count from 1.
+  // Channels are numbered from 1.
   Drive osmc_drive(int channel) const;
   Drive dhb12_drive(int channel) const;
   bool relay_closed(int channel) const;

@@ -83,13 +83,13 @@ class BoardModel {
   // Counts of an encoder's shaft since power_on().
   std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
 
-  // Steps of the motor since power_on(), forward less backward.
+  // Steps of the motor since power_on(), forward minus backward.
   std::int32_t stepper_shaft(int channel) const { return steppers_[channel - 1].driver.shaft(); }
 
   // The robot must outlive the model; nullptr: the vehicle on the bench.
   void connect(RobotModel* robot);
 
-  // The surroundings. Channels count from 1. A RobotModel sets its own motors and encoders.
+  // The surroundings. Channels are numbered from 1. A RobotModel sets its own motors and encoders.
   void hold_handle(bool held);
   bool handle_held() const { return handle_held_; }
   void set_gpio(int channel, bool high) { input(SignalKind::gpio, channel).set(high); }

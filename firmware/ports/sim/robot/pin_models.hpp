@@ -53,7 +53,7 @@ class StepperDriverModel {
 
   void power_on() { position_ = shaft_ = 0; }
   void supply_motor(bool supplied) { supplied_ = supplied; }
-  // Commanded steps since power_on(), forward less backward; wraps at 32 bits.
+  // Commanded steps since power_on(), forward minus backward; wraps at 32 bits.
   std::int32_t position() const { return static_cast<std::int32_t>(position_); }
   std::int32_t shaft() const { return static_cast<std::int32_t>(shaft_); }
   std::uint32_t pulses() const { return step_.pin.rises(); }

@@ -66,7 +66,7 @@ struct Sender : IsotpSender {
   std::string bytes;
 };
 
-// Every transfer that began has one end or is under way.
+// Each started transfer is counted by exactly one result, or is under way.
 inline void expect_counters_add_up(const IsotpSender& sender) {
   const IsotpSenderCounters& c = sender.counters();
   EXPECT_EQ(c.started, c.datagrams + c.send_timeout + c.flow_control_timeout + c.overflow +

@@ -12,8 +12,8 @@ namespace r4::tool::ros2 {
 namespace {
 
 constexpr std::size_t most = 64;
-// Participants are examined before readers and writers, which need their names. Remaining samples
-// wait for the next look, because stops are read on the same thread.
+// Participants are examined first, because each reader or writer is reported with its participant's
+// process. Remaining samples wait for the next look, because stops are read on the same thread.
 constexpr int most_rounds = 16;
 
 // Takes samples of a built-in topic: take(sample, whether its subject exists).
