@@ -104,6 +104,18 @@ void open_close_on_exec(Socket& socket, const typename Socket::protocol_type& pr
   if (error) ::close(descriptor);
 }
 
+// Lets the object of Asio own `descriptor` and wait for it. False, with errno, if `descriptor` is
+// none, or if the loop cannot wait for it.
+template <class Descriptor>
+bool give_to_loop(Descriptor& owner, FileDescriptor descriptor) {
+  if (!descriptor) return false;
+  std::error_code error;
+  owner.assign(descriptor.get(), error);
+  if (!error) return descriptor.release() >= 0;
+  errno = error.value();
+  return false;
+}
+
 inline void close_on_exec(int descriptor) { ::fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
 }  // namespace r4

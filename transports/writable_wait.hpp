@@ -28,7 +28,8 @@ class WritableWait {
       waiting_ = false;
       call();
     });
-    if (duplicate_.is_open() || duplicate(descriptor)) {
+    const auto duplicate = [&] { return FileDescriptor(::fcntl(descriptor, F_DUPFD_CLOEXEC, 0)); };
+    if (duplicate_.is_open() || give_to_loop(duplicate_, duplicate())) {
       duplicate_.async_wait(asio::posix::descriptor_base::wait_write, std::move(handler));
     } else {
       timer_.expires_after(look_again);
@@ -45,16 +46,6 @@ class WritableWait {
 
  private:
   static constexpr std::chrono::milliseconds look_again{1};
-
-  bool duplicate(int descriptor) {
-    FileDescriptor copy(::fcntl(descriptor, F_DUPFD_CLOEXEC, 0));
-    if (!copy) return false;
-    asio::error_code error;
-    duplicate_.assign(copy.get(), error);
-    if (error) return false;
-    copy.release();
-    return true;
-  }
 
   LoopDescriptor duplicate_;
   LoopTimer timer_;

@@ -171,7 +171,8 @@ void AsyncBoard::Impl::open_again() {
     bool failed = false;
     for (const auto& path : self->paths) {
       if (path->opened || !self->has_link()) continue;
-      self->guarded([&] { failed = !self->open_path(*path) || failed; });
+      self->guarded([&] { self->open_path(*path); });
+      failed = failed || !path->opened;
     }
     if (failed && self->has_link()) self->open_again();
   });

@@ -15,7 +15,7 @@ void take(FoundBoard& board, IdentityAnswer answer) {
 
 bool HeldTransport::join(const ShareName& name) {
   for (const BoardRole role : {BoardRole::control, BoardRole::watch}) {
-    if (client_.join(name, role, ShareMessage::Kind::hello, "") != ShareClient::Joined::holder) {
+    if (client_.join(name, role, ShareMessage::Kind::hello) != ShareClient::Joined::holder) {
       continue;
     }
     if (client_.process() != 0) board_.holder = Program{client_.process(), ""};

@@ -14,9 +14,8 @@ constexpr int most_at_once = 64;
 }  // namespace
 
 ShareClient::Joined ShareClient::join(const ShareName& name, BoardRole role,
-                                      ShareMessage::Kind greeting, const std::string& thing) {
+                                      ShareMessage::Kind greeting) {
   leave();
-  thing_ = thing;
   process_ = 0;
   FileDescriptor connection = connect_to_holder(name, role);
   if (!connection) return would_block(errno) ? Joined::crowd : Joined::nobody;
@@ -24,8 +23,7 @@ ShareClient::Joined ShareClient::join(const ShareName& name, BoardRole role,
   if (send_message(connection.get(), greeting, ShareMessage::version) != 0) return Joined::nobody;
   connection_.assign(connection.get());
   process_ = process_of(connection.release());
-  heard_ = false;
-  asked_ = true;
+  silence_ = 2;  // the greeting asks for an answer
   listen();
   expect_answer();
   return Joined::holder;
@@ -37,31 +35,21 @@ void ShareClient::listen() {
 }
 
 void ShareClient::receive() {
-  for (int i = 0; i < most_at_once; ++i) {
-    const ssize_t size =
-        receive_packet(connection_.native_handle(), packet_.data(), packet_.size());
-    if (size < 0 && would_block(errno)) {
-      owner_.on_all_heard();
-      break;
-    }
-    // The holder ended without reading all messages. Its own messages can be read.
-    if (size < 0 && errno == ECONNRESET) continue;
-    if (size <= 0) {
-      leave();
-      return owner_.on_closed();
-    }
-    heard_ = true;
-    const auto message = read_share_message({packet_.data(), static_cast<std::size_t>(size)});
-    if (!message) {
-      return owner_.on_no_help(
-          {ErrorKind::open, thing_,
-           fmt::format("the program that holds it (pid {}) is of another version of R4 link",
-                       process_),
-           "end it, or use the same version for both"});
-    }
-    owner_.on_message(*message);
-    if (!connection_.is_open()) return;
+  const auto take = [this](const std::optional<ShareMessage>& message) {
+    silence_ = 0;
+    if (message) return owner_.on_message(*message);
+    owner_.on_no_help({ErrorKind::open, "",
+                       fmt::format("the program that holds it (pid {}) is of another version of "
+                                   "R4 link",
+                                   process_),
+                       "end it, or use the same version for both"});
+  };
+  const Received received = receive_messages(connection_, most_at_once, take);
+  if (received == Received::end) {
+    leave();
+    return owner_.on_closed();
   }
+  if (received == Received::all) owner_.on_all_heard();
   if (connection_.is_open()) listen();
 }
 
@@ -72,28 +60,20 @@ void ShareClient::expect_answer() {
 
 void ShareClient::look_for_answer() {
   expect_answer();
-  if (std::exchange(heard_, false)) {
-    asked_ = false;
-  } else if (!std::exchange(asked_, true)) {
-    send_message(connection_.native_handle(), ShareMessage::Kind::hello, ShareMessage::version);
-  } else {
-    owner_.on_no_help(silence());
-  }
+  if (silence_ == 2) return owner_.on_no_help(silence());
+  if (silence_++ == 0) return;
+  send_message(connection_.native_handle(), ShareMessage::Kind::hello, ShareMessage::version);
 }
 
 Problem ShareClient::silence() const {
-  if (process_ == 0) {
-    return {ErrorKind::open, thing_,
-            "the program that holds it does not answer, and many wait for it",
-            "let it go on, if it was stopped (fg, or kill -CONT), or end it"};
-  }
-  return {ErrorKind::open, thing_,
-          fmt::format("the program that holds it (pid {}) does not answer", process_),
-          fmt::format("let it go on, if it was stopped (kill -CONT {0}), or end it", process_)};
+  const std::string pid = process_ == 0 ? "" : fmt::format(" {}", process_);
+  return {ErrorKind::open, "",
+          fmt::format("the program that holds it{} does not answer",
+                      pid.empty() ? "" : fmt::format(" (pid{})", pid)),
+          fmt::format("let it go on, if it was stopped (kill -CONT{}), or end it", pid)};
 }
 
 SendResult ShareClient::send_stop(std::string_view datagram) {
-  if (!connection_.is_open()) return SendResult::down;
   const int error = send_message(connection_.native_handle(), ShareMessage::Kind::stop, datagram);
   if (error == 0) return SendResult::sent;
   return would_block(error) ? SendResult::full : SendResult::down;

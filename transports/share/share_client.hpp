@@ -3,10 +3,8 @@
 // answer_within is asked to answer within the same time, because perhaps only the board is silent.
 #pragma once
 
-#include <array>
 #include <asio/io_context.hpp>
 #include <chrono>
-#include <string>
 #include <string_view>
 
 #include "../operation_slot.hpp"
@@ -26,7 +24,8 @@ class ShareClient {
    public:
     virtual void on_message(const ShareMessage& message) = 0;
     virtual void on_all_heard() = 0;  // all arrived messages were delivered
-    // The holder does not answer, or has another version of R4 link. Repeated until an answer.
+    // The holder does not answer, or has another version of R4 link. Repeated until an answer. The
+    // problem's thing is empty.
     virtual void on_no_help(const Problem& why) = 0;
     virtual void on_closed() = 0;
 
@@ -41,10 +40,9 @@ class ShareClient {
 
   enum class Joined { holder, nobody, stranger, crowd };
   // Connects to the holder with that role, and sends `greeting`. `stranger`: another user's program
-  // has the name. `crowd`: too many programs wait for the holder. `thing`: the transport, for
-  // problems. Throws std::system_error if the loop cannot wait for the connection.
-  Joined join(const ShareName& name, BoardRole role, ShareMessage::Kind greeting,
-              const std::string& thing);
+  // has the name. `crowd`: too many programs wait for the holder. Throws std::system_error if the
+  // loop cannot wait for the connection.
+  Joined join(const ShareName& name, BoardRole role, ShareMessage::Kind greeting);
   SendResult send_stop(std::string_view datagram);
   void leave() noexcept;
 
@@ -63,11 +61,9 @@ class ShareClient {
   OperationSlot readable_;
   LoopTimer timer_;
   OperationSlot answering_;
-  std::string thing_;
   pid_t process_ = 0;
-  bool heard_ = false;  // a message arrived since look_for_answer()
-  bool asked_ = false;  // true until the holder answers
-  std::array<char, ShareMessage::max_size + 1> packet_;
+  // 0: heard since the last look_for_answer(); 1: not heard; 2: not heard, and asked.
+  int silence_ = 0;
 };
 
 }  // namespace r4

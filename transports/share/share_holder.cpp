@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <asio/post.hpp>
 #include <cerrno>
 #include <string>
 #include <utility>
@@ -41,24 +40,14 @@ class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
 
   // Copies may be lost. A program that would miss any other message is disconnected.
   void tell(Kind kind, std::string_view text) {
-    if (!is_here()) return;
     const int error = send_message(connection_.native_handle(), kind, text);
     if (would_block(error) && !is_copy(kind)) end();
   }
 
   void receive() {
     const auto self = shared_from_this();  // a stop may release the holder
-    std::array<char, ShareMessage::max_size + 1> packet;
-    for (int i = 0; i < messages_in_a_turn && is_here(); ++i) {
-      const ssize_t size =
-          receive_packet(connection_.native_handle(), packet.data(), packet.size());
-      if (size < 0 && would_block(errno)) break;
-      // The program ended without reading all messages. Its own messages can be read.
-      if (size < 0 && errno == ECONNRESET) continue;
-      if (size <= 0) return end();
-      holder_.on_message(*this,
-                         read_share_message({packet.data(), static_cast<std::size_t>(size)}));
-    }
+    const auto take = [this](const auto& message) { holder_.on_message(*this, message); };
+    if (receive_messages(connection_, messages_in_a_turn, take) == Received::end) end();
     if (!is_here()) return;
     connection_.async_wait(asio::posix::descriptor_base::wait_read,
                            readable_.handler([this] { receive(); }));
@@ -68,7 +57,6 @@ class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
     readable_.cancel();
     asio::error_code ignored;
     connection_.close(ignored);
-    holder_.remove_ended_later();
   }
 
  private:
@@ -79,8 +67,8 @@ class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
 };
 
 bool ShareHolder::hold(const ShareName& name, BoardRole role) {
-  LoopDescriptor listener = on_loop(take_share_name(name, role));
-  if (!listener.is_open()) return false;
+  LoopDescriptor listener(io_);
+  if (!give_to_loop(listener, take_share_name(name, role))) return false;
   release();
   name_ = name;
   listener_ = std::move(listener);
@@ -88,23 +76,11 @@ bool ShareHolder::hold(const ShareName& name, BoardRole role) {
   return true;
 }
 
-// If the loop cannot wait: closed, with errno. An exception could end a driving program.
-LoopDescriptor ShareHolder::on_loop(FileDescriptor descriptor) {
-  LoopDescriptor waited_for(io_);
-  if (!descriptor) return waited_for;
-  asio::error_code error;
-  waited_for.assign(descriptor.get(), error);
-  if (!error) static_cast<void>(descriptor.release());
-  errno = error.value();
-  return waited_for;
-}
-
 void ShareHolder::release() noexcept {
   accepting_.cancel();
   asio::error_code ignored;
   listener_.close(ignored);
   for (const auto& sharer : std::exchange(sharers_, {})) sharer->end();
-  removing_.cancel();
 }
 
 std::size_t ShareHolder::served() const {
@@ -113,7 +89,7 @@ std::size_t ShareHolder::served() const {
 }
 
 void ShareHolder::tell(Kind kind, std::string_view text) {
-  if (sharers_.empty()) return;
+  if (served() == 0) return;
   std::array<char, max_datagram + masking_room> room;
   if (is_copy(kind)) {
     const Text masked = without_secrets(Text(text.substr(0, max_datagram)), room.data());
@@ -134,8 +110,9 @@ void ShareHolder::accept() {
   accept_timer_.expires_after(between_arrivals);
   accept_timer_.async_wait(accepting_.handler([this] { listen(); }));
   if (!connection || !is_one_of_us(connection.get(), name_)) return;
-  LoopDescriptor waited_for = on_loop(std::move(connection));
-  if (!waited_for.is_open()) return;  // the program may reconnect
+  LoopDescriptor waited_for(io_);
+  if (!give_to_loop(waited_for, std::move(connection))) return;  // the program may reconnect
+  std::erase_if(sharers_, [](const auto& each) { return !each->is_here(); });
   const auto sharer = std::make_shared<Sharer>(*this, std::move(waited_for));
   sharers_.push_back(sharer);
   sharer->receive();  // its hello has usually arrived
@@ -168,12 +145,6 @@ void ShareHolder::serve(Sharer& sharer) {
   sharer.set_served();
   sharer.tell(Kind::welcome, ShareMessage::version);
   for (const CarrierEvent& event : owner_.standing()) sharer.tell(Kind::event, text_of(event));
-}
-
-void ShareHolder::remove_ended_later() {
-  asio::post(io_, removing_.handler([this] {
-    std::erase_if(sharers_, [](const auto& each) { return !each->is_here(); });
-  }));
 }
 
 }  // namespace r4

@@ -60,13 +60,11 @@ class ShareHolder {
  private:
   class Sharer;
 
-  LoopDescriptor on_loop(FileDescriptor descriptor);
   void listen();
   void accept();
   void on_message(Sharer& from, const std::optional<ShareMessage>& message);
   void on_hello(Sharer& from);
   void serve(Sharer& sharer);
-  void remove_ended_later();
 
   asio::io_context& io_;
   Owner& owner_;
@@ -74,8 +72,7 @@ class ShareHolder {
   LoopDescriptor listener_;
   OperationSlot accepting_;
   LoopTimer accept_timer_;
-  OperationSlot removing_;
-  std::vector<std::shared_ptr<Sharer>> sharers_;
+  std::vector<std::shared_ptr<Sharer>> sharers_;  // ended sharers are removed at the next arrival
 };
 
 }  // namespace r4

@@ -1,20 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "share_message.hpp"
 
-#include <algorithm>
-
 namespace r4 {
 namespace {
 
 using Kind = ShareMessage::Kind;
-
-// The texts are from another program, and may be printed on a terminal.
-bool is_printable(std::string_view text) {
-  return std::all_of(text.begin(), text.end(), [](char c) {
-    const auto byte = static_cast<unsigned char>(c);
-    return byte >= ' ' && byte != 0x7f;
-  });
-}
 
 constexpr char letter_of(CarrierEvent::Kind kind) {
   return kind == CarrierEvent::Kind::up ? 'u' : kind == CarrierEvent::Kind::down ? 'd' : '!';
@@ -31,12 +21,11 @@ bool read_event(std::string_view text, CarrierEvent& out) {
     return false;
   }
   out.kind = text[0] == 'u' ? Event::up : text[0] == 'd' ? Event::down : Event::warning;
-  out.problem = {static_cast<ErrorKind>(kind), std::string(text.substr(2, first - 2)),
-                 std::string(text.substr(first + 1, second - first - 1)),
-                 std::string(text.substr(second + 1))};
-  const Problem& problem = out.problem;
-  return letter_of(out.kind) == text[0] && is_printable(problem.thing) &&
-         is_printable(problem.reason) && is_printable(problem.fix);
+  // The texts come from another program, and may go to a terminal.
+  out.problem = {static_cast<ErrorKind>(kind), printable(text.substr(2, first - 2)),
+                 printable(text.substr(first + 1, second - first - 1)),
+                 printable(text.substr(second + 1))};
+  return letter_of(out.kind) == text[0];
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <asio/local/datagram_protocol.hpp>
 #include <cstddef>
-#include <cstring>
 #include <fstream>
 #include <vector>
 
@@ -21,41 +21,31 @@ constexpr int most_waiting = 24;
 // About 80 states, so a program that wakes up reads nothing much older than a second.
 constexpr int buffer_bytes = 32 * 1024;
 
-struct Address {
-  sockaddr_un bytes{};
-  socklen_t size = 0;
-};
+using Address = asio::local::datagram_protocol::endpoint;
 
 // A name that is too long for the kernel ends in a hash of the whole name.
 Address address_of(const ShareName& share, BoardRole role) {
-  Address address;
-  address.bytes.sun_family = AF_UNIX;
   const std::string whose =
       share.group.name.empty() ? std::to_string(::geteuid()) : "@" + share.group.name;
   std::string name = fmt::format("r4link/{}/{}{}", whose,
                                  role == BoardRole::control ? "control/" : "", share.text);
-  constexpr std::size_t most = sizeof(address.bytes.sun_path) - 1;
+  constexpr std::size_t most = sizeof(sockaddr_un::sun_path) - 2;
   if (name.size() > most) {
     std::uint64_t hash = 14695981039346656037U;  // FNV-1a
     for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
     name = fmt::format("{}{:016x}", name.substr(0, most - 16), hash);
   }
-  std::memcpy(address.bytes.sun_path + 1, name.data(), name.size());
-  address.size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-  return address;
+  return Address('\0' + name);
 }
 
-// A socket for which `use(socket, address, size)` has succeeded; none, with errno, if it failed.
+// A socket for which `use(socket, address, size)` has returned 0; none, with errno, if it failed.
 template <class Use>
 FileDescriptor local_socket(const ShareName& name, BoardRole role, Use use) {
   FileDescriptor local(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const Address address = address_of(name, role);
-  const auto* const bytes = reinterpret_cast<const sockaddr*>(&address.bytes);
-  if (local && use(local.get(), bytes, address.size) == 0) return local;
-  const int error = errno;
-  local.reset();
-  errno = error;
-  return local;
+  const auto size = static_cast<socklen_t>(address.size());
+  if (local && use(local.get(), address.data(), size) == 0) return local;
+  return FileDescriptor();
 }
 
 ucred credentials_of(int connection) {

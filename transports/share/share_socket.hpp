@@ -8,12 +8,14 @@
 
 #include <sys/types.h>
 
+#include <array>
 #include <cerrno>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "../file_descriptor.hpp"
+#include "../operation_slot.hpp"
 #include "../share_name.hpp"
 #include "r4link/options.hpp"
 #include "share_message.hpp"
@@ -42,5 +44,22 @@ bool is_stopped(pid_t process);
 int send_message(int connection, ShareMessage::Kind kind, std::string_view text);
 // The packet's size, larger than `size` if it was cut; 0 if disconnected; -1 with errno.
 ssize_t receive_packet(int connection, char* out, std::size_t size);
+
+enum class Received { all, more, end };
+// Passes up to `most` messages to `on_message`, an invalid message as none. `end`: disconnected.
+// `more`: messages may wait, or `on_message` has closed the connection.
+template <class OnMessage>
+Received receive_messages(LoopDescriptor& connection, int most, OnMessage on_message) {
+  std::array<char, ShareMessage::max_size + 1> packet;
+  for (int i = 0; i < most && connection.is_open(); ++i) {
+    const ssize_t size = receive_packet(connection.native_handle(), packet.data(), packet.size());
+    if (size < 0 && would_block(errno)) return Received::all;
+    // The other program ended without reading all messages. Its own messages can be read.
+    if (size < 0 && errno == ECONNRESET) continue;
+    if (size <= 0) return Received::end;
+    on_message(read_share_message({packet.data(), static_cast<std::size_t>(size)}));
+  }
+  return Received::more;
+}
 
 }  // namespace r4

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -70,8 +69,7 @@ class SharedCarrier final : public Carrier,
   enum class State { closed, seeking, asking, joined, holding };
   struct Search {
     Clock::time_point began = Clock::now();
-    std::size_t asked = 0;           // the index in `holders` of the last asked holder
-    std::size_t passed = 0;          // how many of `holders` were passed over
+    std::size_t next = 0;            // the index in `holders` of the next holder to ask
     std::optional<Problem> no_help;  // why the first holder was passed over
   };
 
@@ -90,7 +88,6 @@ class SharedCarrier final : public Carrier,
 
   bool take_part();
   void require_control();
-  bool is_found();
   bool hold_to_watch();
   void open_own();
   void pass_over(const Problem& why);
@@ -152,15 +149,13 @@ bool SharedCarrier::take_part() {
   if (!holder_.holds()) share_ = find_();
   const bool controls = role_ == BoardRole::control;
   if (controls && !holder_.holds()) require_control();
-  bool has_stranger = false;
-  for (std::size_t step = std::max<std::size_t>(search_.passed, controls ? 1 : 0); step < 2;
-       ++step) {
-    search_.asked = step;
-    const Joined joined = with_system_errors(name_, [&] {
-      return client_.join(share_, holders[step], controls ? Kind::ask : Kind::hello, name_);
-    });
-    has_stranger = joined == Joined::stranger;
-    if (joined == Joined::nobody || has_stranger) continue;
+  if (controls && search_.next == 0) search_.next = 1;
+  Joined joined = Joined::holder;
+  while (search_.next < holders.size()) {
+    const BoardRole asked = holders[search_.next++];
+    joined = with_system_errors(
+        name_, [&] { return client_.join(share_, asked, controls ? Kind::ask : Kind::hello); });
+    if (joined == Joined::nobody || joined == Joined::stranger) continue;
     if (joined == Joined::holder && !is_stopped(client_.process())) {
       state_ = State::asking;
       return true;
@@ -169,8 +164,7 @@ bool SharedCarrier::take_part() {
     if (joined == Joined::crowd && waits) return false;
     pass_over(client_.silence());
   }
-  const bool is_free = search_.passed < 2 && !has_stranger;
-  if (!controls && is_free && !hold_to_watch()) return false;
+  if (!controls && joined == Joined::nobody && !hold_to_watch()) return false;
   open_own();
   return true;
 }
@@ -202,19 +196,15 @@ void SharedCarrier::change_role(BoardRole role) {
   if (role == role_) return;
   const bool controls = role == BoardRole::control;
   const bool is_open = state_ != State::closed;
-  if (is_open && controls && is_found()) require_control();
+  bool is_found = is_open && controls;
+  try {
+    if (is_found && state_ == State::seeking) share_ = find_();
+  } catch (const Error&) {
+    is_found = false;  // its name is taken when it is found
+  }
+  if (is_found) require_control();
   role_ = role;
   if (is_open) controls ? seek() : lose();
-}
-
-// If the transport is not found yet, its name is taken when it is found.
-bool SharedCarrier::is_found() {
-  try {
-    if (state_ == State::seeking) share_ = find_();
-    return true;
-  } catch (const Error&) {
-    return false;
-  }
 }
 
 // Takes the name of the watching holder. False if another program was faster. A controlling program
@@ -224,7 +214,7 @@ bool SharedCarrier::hold_to_watch() {
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
     return false;
   }
-  if (search_.passed != 0) return true;
+  if (search_.no_help) return true;
   const FileDescriptor other = connect_to_holder(share_, BoardRole::control);
   if (other ? !is_one_of_us(other.get(), share_) : !would_block(errno)) return true;
   holder_.release();
@@ -249,8 +239,9 @@ void SharedCarrier::open_own() {
 
 void SharedCarrier::pass_over(const Problem& why) {
   client_.leave();
-  search_.passed = search_.asked + 1;
-  if (!search_.no_help) search_.no_help = why;
+  if (search_.no_help) return;
+  search_.no_help = why;
+  search_.no_help->thing = name_;
 }
 
 void SharedCarrier::lose() {
@@ -276,15 +267,16 @@ void SharedCarrier::look() {
   } catch (const Error& error) {
     const bool is_news =
         (late() || search_.no_help) && (up_ || !trouble_ || error.kind() != ErrorKind::open);
-    search_.passed = 0;
-    search_.no_help.reset();
     if (is_news) tell({CarrierEvent::Kind::down, error.problem()});
     if (state_ != State::seeking) return;
   }
   look_later(late() ? look_again_slowly : look_again);
 }
 
+// Asks all holders again.
 void SharedCarrier::look_later(milliseconds delay) {
+  search_.next = 0;
+  search_.no_help.reset();
   timer_.expires_after(delay);
   timer_.async_wait(looking_.handler([this] { look(); }));
 }

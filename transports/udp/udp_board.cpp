@@ -12,10 +12,6 @@ namespace {
 
 constexpr int most_packets = 32;  // then other work of the loop runs
 
-asio::ip::address mapped_to_v6(const asio::ip::address& address) {
-  return asio::ip::make_address_v6(asio::ip::v4_mapped, address.to_v4());
-}
-
 }  // namespace
 
 UdpBoard::UdpBoard(asio::io_context& io, const Url& url, HostLookup lookup)
@@ -23,7 +19,7 @@ UdpBoard::UdpBoard(asio::io_context& io, const Url& url, HostLookup lookup)
 
 void UdpBoard::open(Handler& handler) {
   close();
-  const Endpoint local(lookup_.find(url_.host, url_.text), url_.port);
+  const Endpoint local(address_of(lookup_.find(url_.host), url_.host, url_.text), url_.port);
   if (!url_.peer_host.empty()) find_peer(local);
   open_socket(local, false);
   asio::error_code error;
@@ -38,10 +34,11 @@ void UdpBoard::open(Handler& handler) {
 }
 
 void UdpBoard::find_peer(const Endpoint& local) {
-  Endpoint host(lookup_.find(url_.peer_host, url_.text), url_.peer_port);
+  const FoundHost found = lookup_.find(url_.peer_host);
+  Endpoint host(address_of(found, url_.peer_host, url_.text), url_.peer_port);
   const bool v6_socket = local.protocol() == asio::ip::udp::v6();
   if (v6_socket && host.protocol() == asio::ip::udp::v4()) {
-    host.address(mapped_to_v6(host.address()));
+    host.address(asio::ip::make_address_v6(asio::ip::v4_mapped, host.address().to_v4()));
   } else if (!v6_socket && host.protocol() == asio::ip::udp::v6()) {
     throw Error(ErrorKind::usage, url_.text, "an IPv4 socket cannot send to an IPv6 peer",
                 "listen on [::]");
@@ -97,19 +94,14 @@ void UdpBoard::follow_audience() {
   if (audience != nullptr && url_.peer_host.empty()) audience_ = *audience;
 }
 
-UdpEnd::Outcome UdpBoard::transmit(std::string_view bytes, Peer to) {
-  if (to == everyone) {
-    if (audience_) return transmit_to(bytes, audience_->host, true, audience_->at);
-    ++counters_.tx_dropped;
-    return Outcome::failed;
-  }
-  const Place* const asker = peers_.find(to);
+SendResult UdpBoard::transmit(std::string_view bytes, Peer to) {
+  const Place* const asker = to != everyone ? peers_.find(to) : audience_ ? &*audience_ : nullptr;
   if (asker == nullptr) {
     ++counters_.tx_dropped;
-    return Outcome::failed;
+    return SendResult::down;
   }
-  const Outcome outcome = transmit_to(bytes, asker->host, false, asker->at);
-  if (outcome == Outcome::busy) return outcome;
+  const SendResult outcome = transmit_to(bytes, asker->host, to == everyone, asker->at);
+  if (outcome == SendResult::full) return outcome;
   // The paper's client listens at another port of its address.
   if (audience_ && !url_.peer_host.empty() && !peers_.watches(to) &&
       asker->host.address() == audience_->host.address() &&

@@ -37,7 +37,7 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
   void listen() override;
   void take_what_is_there();
   void received(std::string_view bytes) override;
-  Outcome transmit(std::string_view bytes, Peer to) override;
+  SendResult transmit(std::string_view bytes, Peer to) override;
   int probe(const std::vector<OwnAddress>& own) override;
 
   void find_peer(const Endpoint& local);

@@ -2,17 +2,18 @@
 #include "udp_end.hpp"
 
 #include <fmt/format.h>
+#include <glob.h>
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <asio/ip/v6_only.hpp>
 #include <asio/post.hpp>
-#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <set>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -35,48 +36,40 @@ bool is_network_loss(int error) {
 namespace fs = std::filesystem;
 
 // "socket:[1234]", as /proc shows the descriptors of the sockets at that port.
-std::vector<std::string> sockets_of(std::uint16_t port) {
-  std::vector<std::string> sockets;
+std::set<fs::path> sockets_of(std::uint16_t port) {
+  std::set<fs::path> sockets;
   const std::string end = fmt::format(":{:04X}", port);
   for (const char* const table : {"/proc/self/net/udp", "/proc/self/net/udp6"}) {
     std::ifstream lines(table);
     for (std::string line; std::getline(lines, line);) {
-      std::istringstream words(line);
-      std::string number, local, word, inode;
-      words >> number >> local;
-      for (int i = 0; i < 7; ++i) words >> word;  // remote … timeout
-      words >> inode;
-      if (words && local.ends_with(end)) sockets.push_back("socket:[" + inode + "]");
+      std::istringstream text(line);
+      const std::vector<std::string> words{std::istream_iterator<std::string>(text), {}};
+      const bool is_meant = words.size() > 9 && words[1].ends_with(end);
+      if (is_meant) sockets.insert("socket:[" + words[9] + "]");
     }
   }
   return sockets;
 }
 
-bool has_one_of(const fs::path& process, const std::vector<std::string>& sockets) {
-  std::error_code error;
-  for (fs::directory_iterator each(process / "fd", error), end; !error && each != end;
-       each.increment(error)) {
-    std::error_code gone;
-    const std::string target = fs::read_symlink(each->path(), gone).string();
-    if (std::find(sockets.begin(), sockets.end(), target) != sockets.end()) return true;
-  }
-  return false;
-}
-
 // "r4 (pid 123)"; "another program" if this user may not see it (proc(5)).
 std::string user_of_udp_port(std::uint16_t port) {
-  const std::vector<std::string> sockets = sockets_of(port);
-  std::error_code error;
-  for (fs::directory_iterator each("/proc", error), end; !error && each != end;
-       each.increment(error)) {
-    const std::string pid = each->path().filename().string();
-    if (std::isdigit(static_cast<unsigned char>(pid[0])) == 0) continue;
-    if (!has_one_of(each->path(), sockets)) continue;
+  const std::set<fs::path> sockets = sockets_of(port);
+  std::string user;
+  glob_t files{};
+  ::glob("/proc/[0-9]*/fd/*", GLOB_NOSORT, nullptr, &files);
+  for (std::size_t i = 0; i < files.gl_pathc && user.empty(); ++i) {
+    const fs::path file = files.gl_pathv[i];
+    std::error_code gone;
+    if (!sockets.contains(fs::read_symlink(file, gone))) continue;
+    const fs::path process = file.parent_path().parent_path();
+    std::ifstream comm(process / "comm");
     std::string name;
-    std::ifstream comm(each->path() / "comm");
-    if (std::getline(comm, name)) return fmt::format("{} (pid {})", name, pid);
+    if (std::getline(comm, name)) {
+      user = fmt::format("{} (pid {})", name, process.filename().string());
+    }
   }
-  return "another program";
+  ::globfree(&files);
+  return user.empty() ? "another program" : user;
 }
 
 }  // namespace
@@ -136,8 +129,9 @@ void UdpEnd::begin(Handler& handler) {
 
 void UdpEnd::close() noexcept {
   handler_ = nullptr;
-  up_ = reported_up_ = cut_ = false;
-  down_reason_.clear();
+  up_ = cut_ = false;
+  why_down_ = {};
+  reported_.clear();
   refused_error_ = reported_refusal_ = 0;
   reporting_.cancel();
   reception_.cancel();
@@ -167,17 +161,14 @@ void UdpEnd::hand_over(std::string_view bytes, Peer from) {
 }
 
 SendResult UdpEnd::send(std::string_view bytes, Priority priority, Peer to) {
-  if (handler_ == nullptr) return SendResult::down;
+  if (!socket_.is_open()) return SendResult::down;
   if (bytes.size() > max_datagram) {
     ++counters_.tx_errors;
     return SendResult::full;
   }
-  if (!socket_.is_open()) return SendResult::down;
   if (queue_.empty()) {
-    const Outcome outcome = transmit(bytes, to);
-    if (outcome != Outcome::busy) {
-      return outcome == Outcome::sent ? SendResult::sent : SendResult::down;
-    }
+    const SendResult outcome = transmit(bytes, to);
+    if (outcome != SendResult::full) return outcome;
   }
   const SendResult result = queue_.push(bytes, priority, to, std::chrono::steady_clock::now());
   writable_.start(socket_.native_handle(), [this] { send_waiting(); });
@@ -186,7 +177,7 @@ SendResult UdpEnd::send(std::string_view bytes, Priority priority, Peer to) {
 
 void UdpEnd::send_waiting() {
   while (const SendQueue::Entry* entry = queue_.front(std::chrono::steady_clock::now())) {
-    if (transmit(entry->text(), entry->to) == Outcome::busy) {
+    if (transmit(entry->text(), entry->to) == SendResult::full) {
       writable_.start(socket_.native_handle(), [this] { send_waiting(); });
       return;
     }
@@ -195,8 +186,8 @@ void UdpEnd::send_waiting() {
   writable_.stop();
 }
 
-UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
-                                    const asio::ip::address& from) {
+SendResult UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
+                               const asio::ip::address& from) {
   int error = send_packet(socket_.native_handle(), bytes, to, from);
   // ECONNREFUSED is about an earlier packet: no program listened there. This packet was not sent.
   if (error == ECONNREFUSED) error = send_packet(socket_.native_handle(), bytes, to, from);
@@ -208,13 +199,13 @@ UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, 
       set_up(true);
       report_later();
     }
-    return Outcome::sent;
+    return SendResult::sent;
   }
-  if (error == EAGAIN || error == EWOULDBLOCK) return Outcome::busy;
+  if (error == EAGAIN || error == EWOULDBLOCK) return SendResult::full;
   // The interface's queue is full, and the system does not report when it has room.
   if (error == ENOBUFS) {
     ++counters_.tx_dropped;
-    return Outcome::sent;
+    return SendResult::sent;
   }
   ++counters_.tx_errors;
   if (!is_network_loss(error)) {
@@ -223,10 +214,11 @@ UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, 
   } else if (standing && up_) {
     lose_network(error);
   }
-  return Outcome::failed;
+  return SendResult::down;
 }
 
 void UdpEnd::set_up(bool up) {
+  if (up == up_) return;
   up_ = up;
   cut_ = cut_ && !up;
   ++(up ? counters_.ups : counters_.downs);
@@ -234,34 +226,26 @@ void UdpEnd::set_up(bool up) {
 }
 
 void UdpEnd::lose_network(int error) {
-  down_error_ = error;
+  why_down_ = no_route(name_, error);
   set_up(false);
   probe_later();
   report_later();
 }
 
-void UdpEnd::judge_route(int error) {
+void UdpEnd::check_network(const std::vector<OwnAddress>& own) {
+  if (!socket_.is_open()) return;
+  const int error = probe(own);
   if (error != 0 && !is_network_loss(error)) return;
   cut_ = error != 0;
-  if (cut_ && up_) {
-    lose_network(error);
-  } else if (error == 0 && !up_ && socket_.is_open()) {
-    set_up(true);
-    report_later();
-  }
+  if (cut_ && up_) lose_network(error);
+  if (cut_ || up_) return;
+  set_up(true);
+  report_later();
 }
 
 void UdpEnd::warn(const std::string& reason, const std::string& fix) {
   handler_->on_carrier_event(
       {CarrierEvent::Kind::warning, Problem{ErrorKind::open, name_, reason, fix}});
-}
-
-void UdpEnd::tell_why_down(const Problem& problem) {
-  if (up_) set_up(false);
-  reported_up_ = false;
-  if (down_reason_ == problem.reason) return;
-  down_reason_ = problem.reason;
-  handler_->on_carrier_event({CarrierEvent::Kind::down, problem});
 }
 
 void UdpEnd::report_later() {
@@ -276,11 +260,12 @@ void UdpEnd::report() {
            refused_error_ == EPERM ? "let UDP to this address through the firewall" : "");
     }
   }
-  if (handler_ == nullptr || up_ == reported_up_) return;
-  reported_up_ = up_;
+  const std::string status = up_ ? "up" : why_down_.reason;
+  if (handler_ == nullptr || status == reported_) return;
+  reported_ = status;
   handler_->on_carrier_event(
       up_ ? CarrierEvent{CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}}
-          : CarrierEvent{CarrierEvent::Kind::down, no_route(name_, down_error_)});
+          : CarrierEvent{CarrierEvent::Kind::down, why_down_});
 }
 
 Problem UdpEnd::no_route(const std::string& subject, int error) const {
@@ -299,7 +284,7 @@ Problem UdpEnd::no_route(const std::string& subject, int error) const {
 void UdpEnd::probe_later() {
   probe_timer_.expires_after(probe_interval);
   probe_timer_.async_wait(probe_.handler([this] {
-    judge_route(probe(own_addresses()));
+    check_network(own_addresses());
     if (!up_) probe_later();
   }));
 }

@@ -31,12 +31,12 @@ class UdpEnd : public Carrier {
 
  protected:
   using Endpoint = asio::ip::udp::endpoint;
-  enum class Outcome : std::uint8_t { sent, busy, failed };
 
   UdpEnd(asio::io_context& io, UdpUrl url);
 
   virtual void received(std::string_view bytes) = 0;
-  virtual Outcome transmit(std::string_view bytes, Peer to) = 0;
+  // `full`: the socket takes no packet now.
+  virtual SendResult transmit(std::string_view bytes, Peer to) = 0;
   // 0 if the network is up, else errno.
   virtual int probe(const std::vector<OwnAddress>& own) = 0;
   virtual void close_socket() noexcept;
@@ -50,16 +50,16 @@ class UdpEnd : public Carrier {
   // The socket is bound: begins to receive, and is up.
   void begin(Handler& handler);
   void hand_over(std::string_view bytes, Peer from);
-  // `standing`: to everyone, so a failure shows a lost network. `from`: an own address, or any.
-  Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
-                      const asio::ip::address& from = {});
+  // `standing`: `to` is the destination for everyone, so a failed packet shows a lost network.
+  // `from`: an address of this computer; unspecified: any.
+  SendResult transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
+                         const asio::ip::address& from = {});
   void set_up(bool up);
-  // Goes up or down by `error`, the result of probe(). Ignores errors that are not of the network.
-  void judge_route(int error);
+  // Goes up or down by the result of probe(). Ignores errors that are not of the network.
+  void check_network(const std::vector<OwnAddress>& own);
+  // Reports a change of the status, or of the reason why it is down.
   void report();
   void warn(const std::string& reason, const std::string& fix);
-  // Reports that the host is down, once for each reason.
-  void tell_why_down(const Problem& problem);
 
   Problem no_route(const std::string& subject, int error) const;
 
@@ -72,7 +72,7 @@ class UdpEnd : public Carrier {
   WritableWait writable_;
   CarrierCounters counters_;
   Endpoint sender_;
-  std::string down_reason_;  // why the carrier is not open, as reported last
+  Problem why_down_;
   std::array<char, max_datagram> received_;
 
  private:
@@ -86,9 +86,8 @@ class UdpEnd : public Carrier {
   LoopTimer probe_timer_;
   OperationSlot probe_;
   bool up_ = false;
-  bool cut_ = false;  // the interface does not work, though the system may accept packets
-  bool reported_up_ = false;
-  int down_error_ = 0;
+  bool cut_ = false;       // the interface does not work, though the system may accept packets
+  std::string reported_;   // "up", or why it is down
   int refused_error_ = 0;  // why the system refused the last packet; 0 after a success
   int reported_refusal_ = 0;
   OperationSlot reporting_;

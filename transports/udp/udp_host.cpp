@@ -14,7 +14,12 @@ UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardS
       lookup_(std::move(lookup)),
       search_(std::move(search)),
       claim_(std::move(claim)),
-      watch_(io, lookup_),
+      watch_(
+          io, lookup_, [this] { return question(); },
+          [this](const FoundHost& answer) {
+            found(answer);
+            return socket_.is_open();
+          }),
       network_(NetworkWatch::of(io)) {
   search_.port = url_.port;
 }
@@ -26,20 +31,16 @@ void UdpHost::open(Handler& handler) {
   named_ = url_.search || !is_address(url_.host);
   if (named_ && io_.get_executor().running_in_this_thread()) {
     handler_ = &handler;
-    network_.enter(*this);
-    return watch();  // requests the address
-  }
-  if (url_.search) {
-    const FoundHost board = find_board(search_, wanted_);
-    bind(Endpoint(address_of(board, "", url_.text), url_.port));
-    remember(board);
   } else {
-    bind(Endpoint(lookup_.find(url_.host, url_.text), url_.port));
+    const FoundHost board = url_.search ? find_board(search_, wanted_) : lookup_.find(url_.host);
+    bind(Endpoint(address_of(board, url_.host, url_.text), url_.port));
+    wanted_.board_id = board.board_id;
+    begin(handler);
+    if (handler_ == nullptr) return;
   }
-  begin(handler);
-  if (handler_ == nullptr) return;
   network_.enter(*this);
-  watch();
+  // Without a name, only a connected socket needs a watch, because its own address may change.
+  if (named_ || host_socket_.connected()) watch_.start(socket_.is_open());
 }
 
 void UdpHost::close_socket() noexcept { host_socket_.close(); }
@@ -87,25 +88,13 @@ void UdpHost::bind(const Endpoint& board) {
   name_ += fmt::format("{}local={}", joins, url_.local.to_string());
 }
 
-void UdpHost::watch() {
-  // Without a name, only a connected socket needs a watch, because its own address may change.
-  if (!named_ && !host_socket_.connected()) return;
-  watch_.start(named_ ? question() : nullptr, socket_.is_open(),
-               [this](const FoundHost& answer) { found(answer); });
-}
-
 // The question does not use this object, which may be destroyed before the answer arrives.
 HostWatch::Question UdpHost::question() const {
+  if (!named_) return nullptr;
   if (url_.search) {
     return [search = search_, wanted = wanted_] { return find_board(search, wanted); };
   }
   return [resolve = lookup_.resolve, host = url_.host] { return resolve(host); };
-}
-
-void UdpHost::remember(const FoundHost& answer) {
-  if (!url_.search) return;
-  wanted_.board_id = answer.board_id;
-  watch_.ask_for(question());
 }
 
 void UdpHost::found(const FoundHost& answer) {
@@ -115,7 +104,7 @@ void UdpHost::found(const FoundHost& answer) {
     const bool same =
         std::find(addresses.begin(), addresses.end(), board_.address()) != addresses.end();
     // The board has not moved. This computer may have moved.
-    if (same || addresses.empty()) return judge_route(probe(own_addresses()));
+    if (same || addresses.empty()) return check_network(own_addresses());
   }
   const std::string before = is_open ? board_.address().to_string() : "";
   try {
@@ -125,20 +114,19 @@ void UdpHost::found(const FoundHost& answer) {
     close_socket();
     bind(board);
   } catch (const Error& error) {
-    watch_.set_known(socket_.is_open());
-    if (!socket_.is_open()) tell_why_down(error.problem());
-    return;
+    if (socket_.is_open()) return;
+    why_down_ = error.problem();
+    set_up(false);
+    return report();
   }
-  remember(answer);
-  watch_.set_known(true);
-  down_reason_.clear();
+  wanted_.board_id = answer.board_id;
   listen();
-  if (!up()) set_up(true);
+  set_up(true);
   if (is_open) {
     warn(fmt::format("the board is at {} now; it was at {}", board_.address().to_string(), before),
          "");
   }
-  if (handler_ != nullptr) report();
+  report();
 }
 
 void UdpHost::received(std::string_view bytes) {
@@ -158,21 +146,11 @@ void UdpHost::received(std::string_view bytes) {
   hand_over(bytes, everyone);
 }
 
-UdpEnd::Outcome UdpHost::transmit(std::string_view bytes, Peer to) {
-  if (to == everyone) return transmit_to(bytes, board_, true);
-  ++counters_.tx_dropped;
-  return Outcome::failed;
-}
-
 int UdpHost::probe(const std::vector<OwnAddress>& own) {
   if (const int error = probe_route(board_, url_.local, own); error != 0) return error;
   // Another interface may have that address now.
   send_by_interface_of(url_.local, socket_.native_handle(), board_, own);
   return host_socket_.reconnect();
-}
-
-void UdpHost::on_network_change(const std::vector<OwnAddress>& own) {
-  if (socket_.is_open()) judge_route(probe(own));
 }
 
 }  // namespace r4

@@ -23,21 +23,21 @@ class UdpHost final : public UdpEnd, private NetworkWatch::Member {
 
  private:
   void received(std::string_view bytes) override;
-  Outcome transmit(std::string_view bytes, Peer to) override;
+  SendResult transmit(std::string_view bytes, Peer) override {
+    return transmit_to(bytes, board_, true);
+  }
   int probe(const std::vector<OwnAddress>& own) override;
-  void on_network_change(const std::vector<OwnAddress>& own) override;
+  void on_network_change(const std::vector<OwnAddress>& own) override { check_network(own); }
   void close_socket() noexcept override;
 
   void bind(const Endpoint& board);
   void found(const FoundHost& answer);
-  void remember(const FoundHost& answer);
   HostWatch::Question question() const;
-  void watch();
 
   const HostLookup lookup_;
   BoardSearch search_;
   const Claim claim_;
-  WantedBoard wanted_;  // wanted board of a search
+  WantedBoard wanted_;  // of a search: the board that was found, even if other boards answer
   HostWatch watch_;
   UdpHostSocket host_socket_{socket_};
   NetworkWatch& network_;

@@ -3,7 +3,6 @@
 
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <mutex>
 #include <vector>
@@ -19,11 +18,6 @@ struct Bound {
 Bound& bound() {
   static Bound& of_this_process = *new Bound;
   return of_this_process;
-}
-
-void set_reuse(int descriptor, bool on) {
-  const int value = on ? 1 : 0;
-  ::setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &value, sizeof value);
 }
 
 }  // namespace
@@ -45,35 +39,32 @@ asio::error_code UdpHostSocket::bind(const Endpoint& local, const Endpoint& boar
     socket_.bind(local_, error);
   } else {
     // Only during bind(), because another program must not share the port.
-    for (const UdpHostSocket* const each : others) set_reuse(each->descriptor_, true);
-    set_reuse(socket_.native_handle(), true);
+    const auto share = [&](bool on) {
+      const UdpSocket::reuse_address option(on);
+      asio::error_code ignored;
+      socket_.set_option(option, ignored);
+      for (UdpHostSocket* const each : others) each->socket_.set_option(option, ignored);
+    };
+    share(true);
     for (UdpHostSocket* const each : others) {
       if (each->board_.address() == board.address()) each->neighbours_ = true;
     }
     socket_.bind(local_, error);
     if (!error) socket_.connect(board, error);
-    set_reuse(socket_.native_handle(), false);
-    for (const UdpHostSocket* const each : others) set_reuse(each->descriptor_, false);
+    share(false);
     connected_ = neighbours_ = true;
   }
   if (!error) local_.port(socket_.local_endpoint(error).port());
-  if (error) return error;
-  all.sockets.push_back(this);
-  descriptor_ = socket_.native_handle();
+  if (!error) all.sockets.push_back(this);
   return error;
 }
 
 void UdpHostSocket::close() noexcept {
-  asio::error_code ignored;
-  if (descriptor_ < 0) {
-    socket_.close(ignored);
-    return;
-  }
   // Under the lock, the next bind() finds the port either free or shared.
   Bound& all = bound();
   const std::lock_guard lock(all.mutex);
-  all.sockets.erase(std::remove(all.sockets.begin(), all.sockets.end(), this), all.sockets.end());
-  descriptor_ = -1;
+  std::erase(all.sockets, this);
+  asio::error_code ignored;
   socket_.close(ignored);
 }
 
@@ -81,9 +72,9 @@ int UdpHostSocket::reconnect() {
   if (!connected_) return 0;
   sockaddr none{};
   none.sa_family = AF_UNSPEC;
-  const bool done =
-      ::connect(descriptor_, &none, sizeof none) == 0 &&
-      ::connect(descriptor_, board_.data(), static_cast<socklen_t>(board_.size())) == 0;
+  const int socket = socket_.native_handle();
+  const bool done = ::connect(socket, &none, sizeof none) == 0 &&
+                    ::connect(socket, board_.data(), static_cast<socklen_t>(board_.size())) == 0;
   return done ? 0 : errno;
 }
 

@@ -42,7 +42,6 @@ class UdpHostSocket {
 
  private:
   UdpSocket& socket_;
-  int descriptor_ = -1;  // -1: not bound
   Endpoint local_;
   Endpoint board_;
   bool connected_ = false;

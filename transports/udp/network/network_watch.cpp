@@ -7,6 +7,9 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
+
+#include "../../file_descriptor.hpp"
 
 namespace r4 {
 namespace {
@@ -18,10 +21,11 @@ constexpr int most_in_a_turn = 64;
 asio::execution_context::id NetworkWatch::id;
 
 NetworkWatch::NetworkWatch(asio::execution_context& context)
-    : service(context), waits_(static_cast<asio::io_context&>(context)) {}
+    : service(context), changes_(static_cast<asio::io_context&>(context)) {}
 
 void NetworkWatch::shutdown() noexcept {
-  if (waits_.is_open()) waits_.release();
+  asio::error_code ignored;
+  changes_.close(ignored);
 }
 
 void NetworkWatch::enter(Member& member) {
@@ -30,45 +34,40 @@ void NetworkWatch::enter(Member& member) {
 }
 
 void NetworkWatch::leave(Member& member) {
-  std::replace(members_.begin(), members_.end(), &member, static_cast<Member*>(nullptr));
-  if (std::any_of(members_.begin(), members_.end(), [](const Member* each) { return each; }))
-    return;
+  std::erase(members_, &member);
+  if (!members_.empty()) return;
   // Without members, the watch must not keep the loop running.
-  members_.clear();
   waiting_.cancel();
-  if (waits_.is_open()) waits_.release();
-  changes_.reset();
+  shutdown();
 }
 
 void NetworkWatch::open() {
-  changes_.reset(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, NETLINK_ROUTE));
-  if (!changes_) return;
+  FileDescriptor changes(
+      ::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, NETLINK_ROUTE));
   sockaddr_nl all{};
   all.nl_family = AF_NETLINK;
   all.nl_groups = RTMGRP_LINK | RTMGRP_IPV4_IFADDR | RTMGRP_IPV6_IFADDR;
-  if (::bind(changes_.get(), reinterpret_cast<const sockaddr*>(&all), sizeof all) != 0) return;
-  asio::error_code error;
-  waits_.assign(changes_.get(), error);
-  if (!error) wait();
+  if (::bind(changes.get(), reinterpret_cast<const sockaddr*>(&all), sizeof all) != 0) return;
+  if (give_to_loop(changes_, std::move(changes))) wait();
 }
 
 void NetworkWatch::wait() {
-  waits_.async_wait(asio::posix::descriptor_base::wait_read, waiting_.handler([this] { tell(); }));
+  changes_.async_wait(asio::posix::descriptor_base::wait_read,
+                      waiting_.handler([this] { tell(); }));
 }
 
 // Looks up all addresses, because reports may be lost, and one change may cause many reports.
 void NetworkWatch::tell() {
   std::array<char, 4096> report;
   for (int i = 0; i < most_in_a_turn; ++i) {
-    if (::recv(changes_.get(), report.data(), report.size(), MSG_TRUNC) <= 0) break;
+    if (::recv(changes_.native_handle(), report.data(), report.size(), MSG_TRUNC) <= 0) break;
   }
   const std::vector<OwnAddress> own = own_addresses();
-  std::size_t next = 0;  // members may enter and leave meanwhile
-  while (next < members_.size()) {
-    Member* const member = members_[next++];
-    if (member != nullptr) member->on_network_change(own);
+  const std::vector<Member*> notified = members_;  // members may enter and leave meanwhile
+  for (Member* const member : notified) {
+    const bool is_here = std::find(members_.begin(), members_.end(), member) != members_.end();
+    if (is_here) member->on_network_change(own);
   }
-  members_.erase(std::remove(members_.begin(), members_.end(), nullptr), members_.end());
   if (!members_.empty()) wait();
 }
 

@@ -8,7 +8,6 @@
 #include <asio/io_context.hpp>
 #include <vector>
 
-#include "../../file_descriptor.hpp"
 #include "../../operation_slot.hpp"
 #include "udp_route.hpp"
 
@@ -41,10 +40,9 @@ class NetworkWatch final : public asio::execution_context::service {
   void wait();
   void tell();
 
-  FileDescriptor changes_;  // a socket of rtnetlink
-  LoopDescriptor waits_;
+  LoopDescriptor changes_;  // a socket of rtnetlink
   OperationSlot waiting_;
-  std::vector<Member*> members_;  // nullptr: has left during a notification
+  std::vector<Member*> members_;
 };
 
 }  // namespace r4

@@ -13,8 +13,6 @@ namespace {
 using asio::ip::address;
 using Endpoint = asio::ip::udp::endpoint;
 
-// The system reports an error of an earlier packet once.
-constexpr int most_errors = 4;
 constexpr std::size_t control_size = CMSG_SPACE(sizeof(in6_pktinfo));
 
 address address_of(const cmsghdr& item) {
@@ -45,16 +43,6 @@ void put(msghdr& message, int level, int type, const Info& info) {
   std::memcpy(CMSG_DATA(item), &info, sizeof info);
 }
 
-// `call()` sends. 0, or errno.
-template <class Call>
-int result_of(Call call) {
-  ssize_t sent = 0;
-  do {
-    sent = call();
-  } while (sent < 0 && errno == EINTR);
-  return sent >= 0 ? 0 : errno;
-}
-
 }  // namespace
 
 bool note_addresses(int socket, const asio::ip::udp& protocol) {
@@ -70,18 +58,13 @@ std::optional<std::size_t> receive_packet(int socket, char* out, std::size_t roo
   alignas(cmsghdr) char control[control_size];
   iovec part{out, room};
   msghdr message{};
-  ssize_t size = -1;
-  for (int i = 0; size < 0 && i < most_errors; ++i) {
-    message = {};
-    message.msg_name = from.data();
-    message.msg_namelen = static_cast<socklen_t>(from.capacity());
-    message.msg_iov = &part;
-    message.msg_iovlen = 1;
-    message.msg_control = control;
-    message.msg_controllen = sizeof control;
-    size = ::recvmsg(socket, &message, MSG_DONTWAIT | MSG_TRUNC);
-    if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) break;
-  }
+  message.msg_name = from.data();
+  message.msg_namelen = static_cast<socklen_t>(from.capacity());
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control;
+  message.msg_controllen = sizeof control;
+  const ssize_t size = ::recvmsg(socket, &message, MSG_DONTWAIT | MSG_TRUNC);
   if (size < 0) return std::nullopt;
   from.resize(message.msg_namelen);
   const cmsghdr* const item = CMSG_FIRSTHDR(&message);
@@ -90,12 +73,6 @@ std::optional<std::size_t> receive_packet(int socket, char* out, std::size_t roo
 }
 
 int send_packet(int socket, std::string_view bytes, const Endpoint& to, const address& from) {
-  constexpr int flags = MSG_DONTWAIT | MSG_NOSIGNAL;
-  const auto send_by_any = [&] {
-    return ::sendto(socket, bytes.data(), bytes.size(), flags, to.data(),
-                    static_cast<socklen_t>(to.size()));
-  };
-  if (from.is_unspecified()) return result_of(send_by_any);
   alignas(cmsghdr) char control[control_size] = {};
   // The kernel only reads the buffers.
   iovec part{const_cast<char*>(bytes.data()), bytes.size()};  // NOLINT
@@ -105,19 +82,23 @@ int send_packet(int socket, std::string_view bytes, const Endpoint& to, const ad
   message.msg_iov = &part;
   message.msg_iovlen = 1;
   message.msg_control = control;
-  if (from.is_v4()) {
+  if (from.is_v4() && !from.is_unspecified()) {
     in_pktinfo info{};
     info.ipi_spec_dst.s_addr = htonl(from.to_v4().to_uint());
     put(message, IPPROTO_IP, IP_PKTINFO, info);
-  } else {
+  } else if (from.is_v6() && !from.is_unspecified()) {
     in6_pktinfo info{};
     const auto address_bytes = from.to_v6().to_bytes();
     std::memcpy(&info.ipi6_addr, address_bytes.data(), address_bytes.size());
     put(message, IPPROTO_IPV6, IPV6_PKTINFO, info);
   }
-  const int error = result_of([&] { return ::sendmsg(socket, &message, flags); });
-  // This computer may have lost that address.
-  return error == EINVAL || error == EADDRNOTAVAIL ? result_of(send_by_any) : error;
+  const auto send = [&] {
+    return ::sendmsg(socket, &message, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0 ? 0 : errno;
+  };
+  const int error = send();
+  if (message.msg_controllen == 0 || (error != EINVAL && error != EADDRNOTAVAIL)) return error;
+  message.msg_controllen = 0;  // this computer may have lost that address
+  return send();
 }
 
 }  // namespace r4

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <asio/ip/udp.hpp>
 #include <cerrno>
 #include <cstring>
 #include <memory>
@@ -25,6 +26,7 @@ namespace r4 {
 namespace {
 
 using asio::ip::address_v4;
+using Endpoint = asio::ip::udp::endpoint;
 using Network = BoardSearch::Network;
 using Clock = std::chrono::steady_clock;
 
@@ -32,14 +34,6 @@ constexpr std::size_t most_networks = 64;
 // Datagrams read from one socket before the next socket is read and the time checked.
 constexpr int most_at_once = 64;
 constexpr std::size_t most_listed = 8;  // boards in an error; `r4 list` shows all of them
-
-sockaddr_in system_address(const address_v4& address, std::uint16_t port) {
-  sockaddr_in system{};
-  system.sin_family = AF_INET;
-  system.sin_port = htons(port);
-  system.sin_addr.s_addr = htonl(address.to_uint());
-  return system;
-}
 
 address_v4 address_of(const sockaddr* system) {
   sockaddr_in in{};
@@ -52,10 +46,10 @@ FileDescriptor open_in(Network& network) {
   FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int on = 1;
   const std::uint32_t index = htonl(network.index);
-  const sockaddr_in from = system_address(network.from, 0);
+  const Endpoint from(network.from, 0);
   if (!socket || ::setsockopt(socket.get(), SOL_SOCKET, SO_BROADCAST, &on, sizeof on) != 0 ||
       ::setsockopt(socket.get(), IPPROTO_IP, IP_UNICAST_IF, &index, sizeof index) != 0 ||
-      ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&from), sizeof from) != 0) {
+      ::bind(socket.get(), from.data(), static_cast<socklen_t>(from.size())) != 0) {
     network.trouble = std::strerror(errno);
     return FileDescriptor();
   }
@@ -63,9 +57,9 @@ FileDescriptor open_in(Network& network) {
 }
 
 void ask(int socket, Network& network, std::uint16_t port, const std::string& text) {
-  const sockaddr_in to = system_address(network.to, port);
+  const Endpoint to(network.to, port);
   const bool sent = ::sendto(socket, text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-                             reinterpret_cast<const sockaddr*>(&to), sizeof to) >= 0;
+                             to.data(), static_cast<socklen_t>(to.size())) >= 0;
   network.trouble = sent ? "" : std::strerror(errno);
 }
 
@@ -81,24 +75,10 @@ class Round {
 
   BoardSearch::Result run() {
     const std::string text = identity_question();
-    const auto begun = Clock::now();
-    const auto end = begun + search_.patience;
-    auto next_question = begun;
-    int asked = 0;
-    for (auto now = begun; now < end; now = Clock::now()) {
-      if (asked < search_.questions && now >= next_question) {
-        ask_all(text);
-        ++asked;
-        next_question = now + search_.between;
-      }
-      const auto until = asked < search_.questions ? std::min(end, next_question) : end;
-      const auto wait = std::chrono::ceil<std::chrono::milliseconds>(until - now).count();
-      if (::poll(polled_.data(), polled_.size(), wait > 0 ? static_cast<int>(wait) : 0) <= 0) {
-        continue;
-      }
-      for (std::size_t i = 0; i < polled_.size(); ++i) {
-        if (polled_[i].revents != 0) hear(i);
-      }
+    const auto end = Clock::now() + search_.patience;
+    for (int left = search_.questions; left > 0; --left) {
+      ask_all(text);
+      hear_until(left == 1 ? end : std::min(end, Clock::now() + search_.between));
     }
     merge_own();
     result_.others = others_.size();
@@ -106,6 +86,16 @@ class Round {
   }
 
  private:
+  void hear_until(Clock::time_point end) {
+    for (auto now = Clock::now(); now < end; now = Clock::now()) {
+      const auto wait = std::chrono::ceil<std::chrono::milliseconds>(end - now).count();
+      if (::poll(polled_.data(), polled_.size(), static_cast<int>(wait)) <= 0) continue;
+      for (std::size_t i = 0; i < polled_.size(); ++i) {
+        if (polled_[i].revents != 0) hear(i);
+      }
+    }
+  }
+
   void ask_all(const std::string& text) {
     for (std::size_t i = 0; i < sockets_.size(); ++i) {
       if (sockets_[i]) ask(sockets_[i].get(), result_.networks[i], search_.port, text);
@@ -114,23 +104,19 @@ class Round {
 
   void hear(std::size_t which) {
     for (int i = 0; i < most_at_once; ++i) {
-      sockaddr_in from{};
-      socklen_t from_size = sizeof from;
-      const ssize_t size =
-          ::recvfrom(sockets_[which].get(), buffer_.data(), buffer_.size(),
-                     MSG_DONTWAIT | MSG_TRUNC, reinterpret_cast<sockaddr*>(&from), &from_size);
+      Endpoint from;
+      auto from_size = static_cast<socklen_t>(from.size());
+      const ssize_t size = ::recvfrom(sockets_[which].get(), buffer_.data(), buffer_.size(),
+                                      MSG_DONTWAIT | MSG_TRUNC, from.data(), &from_size);
       if (size < 0) return;
       // A board answers from the port at which it listens.
-      if (ntohs(from.sin_port) != search_.port || static_cast<std::size_t>(size) > max_datagram) {
+      if (from.port() != search_.port || static_cast<std::size_t>(size) > max_datagram) {
         continue;
       }
       std::optional<IdentityAnswer> answer =
           read_identity_answer(Text(buffer_.data(), static_cast<std::size_t>(size)));
       if (!answer) continue;
-      AnsweredBoard board{std::move(*answer), {}, {}};
-      board.address = address_v4(ntohl(from.sin_addr.s_addr));
-      board.heard_at = result_.networks[which].from;
-      keep(std::move(board));
+      keep({std::move(*answer), from.address().to_v4(), result_.networks[which].from});
     }
   }
 
@@ -143,11 +129,8 @@ class Round {
     for (const AnsweredBoard& known : result_.boards) {
       if (known.address == board.address) return;
     }
-    if (result_.boards.size() == BoardSearch::most_boards) {
-      result_.more = true;
-      return;
-    }
-    result_.boards.push_back(std::move(board));
+    result_.more = result_.boards.size() == BoardSearch::most_boards;
+    if (!result_.more) result_.boards.push_back(std::move(board));
   }
 
   bool is_own(const address_v4& address) const {
@@ -178,15 +161,11 @@ class Round {
 };
 
 Problem nothing_found(const BoardSearch::Result& result, const WantedBoard& wanted) {
-  std::vector<std::string> interfaces;  // each once; an interface may have several addresses
+  std::set<std::string> interfaces;  // an interface may have several addresses
   std::string trouble;
   for (const Network& network : result.networks) {
-    if (!network.trouble.empty()) {
-      trouble = network.interface + ": " + network.trouble;
-    } else if (std::find(interfaces.begin(), interfaces.end(), network.interface) ==
-               interfaces.end()) {
-      interfaces.push_back(network.interface);
-    }
+    if (network.trouble.empty()) interfaces.insert(network.interface);
+    if (!network.trouble.empty()) trouble = network.interface + ": " + network.trouble;
   }
   const std::string asked = fmt::format("{}", fmt::join(interfaces, ", "));
   if (asked.empty()) {

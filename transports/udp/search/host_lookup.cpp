@@ -17,8 +17,8 @@ namespace r4 {
 namespace {
 
 // Calls `done(answer)` in a detached thread, which may outlive all objects except the arguments.
-template <class Question, class Done>
-void ask_in_a_thread(Question question, Done done) {
+template <class Done>
+void ask_in_a_thread(const HostWatch::Question& question, Done done) {
   // An exception that leaves the thread would end the program, which may be driving.
   const auto ask = [question] {
     try {
@@ -46,16 +46,14 @@ FoundHost HostLookup::ask_system(const std::string& host) {
   return found;
 }
 
-asio::ip::address HostLookup::find(const std::string& host, const std::string& thing) const {
-  if (is_address(host)) return address_of({{asio::ip::make_address(host)}, ""}, host, thing);
+FoundHost HostLookup::find(const std::string& host) const {
+  if (is_address(host)) return {{asio::ip::make_address(host)}, ""};
   const auto answer = std::make_shared<std::promise<FoundHost>>();
   std::future<FoundHost> found = answer->get_future();
-  const auto question = [ask = resolve, host] { return ask(host); };
-  ask_in_a_thread(question, [answer](FoundHost each) { answer->set_value(std::move(each)); });
-  if (found.wait_for(patience) != std::future_status::ready) {
-    return address_of({{}, "no name server answers"}, host, thing);
-  }
-  return address_of(found.get(), host, thing);
+  ask_in_a_thread([ask = resolve, host] { return ask(host); },
+                  [answer](FoundHost each) { answer->set_value(std::move(each)); });
+  if (found.wait_for(patience) == std::future_status::ready) return found.get();
+  return {{}, "no name server answers"};
 }
 
 asio::ip::address address_of(const FoundHost& found, const std::string& host,
@@ -90,14 +88,17 @@ struct HostWatch::Asked {
   HostWatch* asker = nullptr;
 };
 
-HostWatch::HostWatch(asio::io_context& io, HostLookup lookup)
-    : io_(io), lookup_(std::move(lookup)), timer_(io) {}
+HostWatch::HostWatch(asio::io_context& io, HostLookup lookup, std::function<Question()> question,
+                     OnFound on_found)
+    : io_(io),
+      lookup_(std::move(lookup)),
+      question_(std::move(question)),
+      on_found_(std::move(on_found)),
+      timer_(io) {}
 
-void HostWatch::start(Question question, bool known, OnFound on_found) {
+void HostWatch::start(bool known) {
   stop();
-  what_to_ask_ = std::move(question);
   known_ = known;
-  on_found_ = std::move(on_found);
   if (!known) ask();
   wait();
 }
@@ -106,7 +107,6 @@ void HostWatch::stop() {
   waiting_.cancel();
   timer_.cancel();
   heard_ = true;
-  on_found_ = nullptr;
   if (!asked_) return;
   {
     const std::lock_guard lock(asked_->mutex);
@@ -117,17 +117,21 @@ void HostWatch::stop() {
 
 void HostWatch::ask() {
   if (asked_) return;
+  const Question question = question_();
+  if (!question) {
+    known_ = on_found_({});
+    return;
+  }
   asked_ = std::make_shared<Asked>();
   asked_->asker = this;
-  ask_in_a_thread(what_to_ask_, [asked = asked_](const FoundHost& found) {
+  ask_in_a_thread(question, [asked = asked_](const FoundHost& found) {
     const std::lock_guard lock(asked->mutex);
     if (asked->asker == nullptr) return;
     asio::post(asked->asker->io_, [asked, found] {
       HostWatch* const asker = asked->asker;  // only the thread of the loop writes it
       if (asker == nullptr) return;
       asker->asked_.reset();
-      const OnFound on_found = asker->on_found_;  // the callback may stop the watch
-      on_found(found);
+      asker->known_ = asker->on_found_(found);
     });
   });
 }
@@ -139,10 +143,7 @@ void HostWatch::wait() {
     const bool silent = !known_ || !heard_;
     heard_ = !known_;
     wait();
-    if (!silent) return;
-    if (what_to_ask_) return ask();
-    const OnFound on_found = on_found_;  // the callback may stop the watch
-    on_found({});
+    if (silent) ask();
   }));
 }
 

@@ -36,8 +36,8 @@ struct HostLookup {
   std::chrono::milliseconds retry{1000};     // from a failed question to the next
   std::chrono::milliseconds silence{3000};   // silence before a board is looked up again
 
-  // `host`: a name or an address. Blocks, at most for `patience`. Throws Error about `thing`.
-  asio::ip::address find(const std::string& host, const std::string& thing) const;
+  // `host`: a name or an address. Blocks, at most for `patience`.
+  FoundHost find(const std::string& host) const;
 };
 
 // The address to use: IPv4 first, as on the board's WiFi. Throws Error about `thing` if none.
@@ -49,21 +49,22 @@ bool is_address(const std::string& host);
 // Requests a board's address until it is known, and again when the board is silent.
 class HostWatch {
  public:
-  HostWatch(asio::io_context& io, HostLookup lookup);
   HostWatch(const HostWatch&) = delete;
   HostWatch& operator=(const HostWatch&) = delete;
   ~HostWatch() { stop(); }
 
   using Question = std::function<FoundHost()>;  // blocks; called in a separate thread
-  using OnFound = std::function<void(const FoundHost&)>;
-  // Calls `on_found`, on the loop, with each answer. If the address is not `known`, asks at once.
-  // Without a question, `on_found` gets an empty answer when the board is silent.
-  void start(Question question, bool known, OnFound on_found);
-  void ask_for(Question question) { what_to_ask_ = std::move(question); }
-  // No call follows. An open question continues in its thread, and the answer is dropped.
+  // Called on the loop with each answer. Returns true if the address is known now.
+  using OnFound = std::function<bool(const FoundHost&)>;
+  // `question` is called on the loop. If it returns none, `on_found` gets an empty answer at once.
+  HostWatch(asio::io_context& io, HostLookup lookup, std::function<Question()> question,
+            OnFound on_found);
+  // Asks at once unless the address is `known`.
+  void start(bool known);
+  // No call follows. An open question continues in its thread, and its answer is dropped.
   void stop();
 
-  void set_known(bool known) { known_ = known; }
+  // True if heard() has an effect.
   bool listens() const { return !heard_; }
   void heard() { heard_ = true; }
 
@@ -74,8 +75,8 @@ class HostWatch {
 
   asio::io_context& io_;
   const HostLookup lookup_;
-  Question what_to_ask_;
-  OnFound on_found_;
+  const std::function<Question()> question_;
+  const OnFound on_found_;
   bool known_ = false;
   bool heard_ = true;
   LoopTimer timer_;
