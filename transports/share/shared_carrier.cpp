@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -69,7 +70,8 @@ class SharedCarrier final : public Carrier,
   enum class State { closed, seeking, asking, joined, holding };
   struct Search {
     Clock::time_point began = Clock::now();
-    std::size_t next = 0;            // the index in `holders` of the next holder to ask
+    std::size_t first = 0;           // the index in `holders` of the first one not passed over
+    std::size_t next = 0;            // the index of the next holder to ask
     std::optional<Problem> no_help;  // why the first holder was passed over
   };
 
@@ -149,7 +151,7 @@ bool SharedCarrier::take_part() {
   if (!holder_.holds()) share_ = find_();
   const bool controls = role_ == BoardRole::control;
   if (controls && !holder_.holds()) require_control();
-  if (controls && search_.next == 0) search_.next = 1;
+  search_.next = std::max<std::size_t>(search_.first, controls ? 1 : 0);
   Joined joined = Joined::holder;
   while (search_.next < holders.size()) {
     const BoardRole asked = holders[search_.next++];
@@ -239,6 +241,7 @@ void SharedCarrier::open_own() {
 
 void SharedCarrier::pass_over(const Problem& why) {
   client_.leave();
+  search_.first = search_.next;
   if (search_.no_help) return;
   search_.no_help = why;
   search_.no_help->thing = name_;
@@ -267,16 +270,15 @@ void SharedCarrier::look() {
   } catch (const Error& error) {
     const bool is_news =
         (late() || search_.no_help) && (up_ || !trouble_ || error.kind() != ErrorKind::open);
+    search_.first = 0;  // ask all holders again
+    search_.no_help.reset();
     if (is_news) tell({CarrierEvent::Kind::down, error.problem()});
     if (state_ != State::seeking) return;
   }
   look_later(late() ? look_again_slowly : look_again);
 }
 
-// Asks all holders again.
 void SharedCarrier::look_later(milliseconds delay) {
-  search_.next = 0;
-  search_.no_help.reset();
   timer_.expires_after(delay);
   timer_.async_wait(looking_.handler([this] { look(); }));
 }
