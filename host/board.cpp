@@ -30,6 +30,7 @@ Board::Board(const std::vector<CarrierMaker>& makers, BoardOptions options,
     : impl_(Impl::started(
           [&makers](Loop& loop) {
             std::vector<std::unique_ptr<Carrier>> carriers;
+            carriers.reserve(makers.size());
             for (const CarrierMaker& make : makers) carriers.push_back(make(loop));
             return carriers;
           },

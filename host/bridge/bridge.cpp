@@ -107,6 +107,7 @@ struct Bridge::Impl {
 
   std::vector<BridgeStatus> collect() const {
     std::vector<BridgeStatus> all;
+    all.reserve(pairs.size());
     for (const auto& pair : pairs) all.push_back(pair->status());
     return all;
   }

@@ -112,6 +112,7 @@ FleetResults Fleet::send(const Boards& boards, std::string_view text, Duration t
   const CommandOrGroup what = parse_text(text);
   if (const auto* command = std::get_if<OwnCommand>(&what)) return send(boards, *command, timeout);
   std::vector<BoardSetpoints> setpoints;
+  setpoints.reserve(boards.size());
   for (const std::size_t board : boards) setpoints.push_back({board, std::get<Setpoints>(what)});
   return send(setpoints, timeout);
 }

@@ -34,6 +34,7 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
                    ASIO_CONCURRENCY_HINT_UNSAFE_IO, std::exchange(options.on_wait, nullptr)),
       role(options.role),
       urls(urls_of(patterns)) {
+  boards.reserve(urls.size());
   links.resize(urls.size());
   for (std::size_t i = 0; i < urls.size(); ++i) {
     all_boards.push_back(i);
