@@ -102,26 +102,26 @@ class R4LINK_API Datagram {
   Datagram(const Datagram& other) { *this = other; }
   Datagram& operator=(const Datagram& other);
 
-  Iterator begin() const { return fields_.empty() ? end() : Iterator(*this); }
-  Iterator end() const { return Iterator(fields_.end()); }
+  Iterator begin() const { return facts_.fields.empty() ? end() : Iterator(*this); }
+  Iterator end() const { return Iterator(facts_.fields.end()); }
 
   // The datagram's bytes without the line terminator.
-  Text bytes() const { return bytes_; }
+  Text bytes() const { return facts_.bytes; }
   // The first field of that name. If there is no such field: a Field with an empty name.
   Field find(Text name) const;
 
   // The checksum in the datagram: of all bytes up to and including the first `^`.
-  std::uint32_t checksum() const { return checksum_; }
+  std::uint32_t checksum() const { return facts_.checksum; }
   // PNum and T, if present. A host heartbeat may lack PNum.
-  bool has_pnum() const { return has_pnum_; }
-  std::uint32_t pnum() const { return pnum_; }
-  bool has_time() const { return has_time_; }
-  std::uint64_t time_ms() const { return time_ms_; }
+  bool has_pnum() const { return facts_.has_pnum; }
+  std::uint32_t pnum() const { return facts_.pnum; }
+  bool has_time() const { return facts_.has_time; }
+  std::uint64_t time_ms() const { return facts_.time_ms; }
   // The session id (SID). If the datagram has no SID: no_session.
-  SessionId session_id() const { return sid_; }
+  SessionId session_id() const { return facts_.sid; }
   // The number of fields whose names are command letters (0 or more), and the first such field.
-  int command_count() const { return command_count_; }
-  const Field& command() const { return command_; }
+  int command_count() const { return facts_.command_count; }
+  const Field& command() const { return facts_.command; }
 
  private:
   friend ReadResult read_datagram(Text bytes, Datagram& out);
@@ -130,18 +130,22 @@ class R4LINK_API Datagram {
   const char* read_short_names(const std::uint64_t* short_names);
   Text values_at(std::size_t word, std::uint64_t bit) const;
 
-  Text bytes_;
-  Text fields_;
-  std::uint64_t time_ms_ = 0;
-  SessionId sid_ = no_session;
-  std::uint32_t checksum_ = 0;
-  std::uint32_t pnum_ = 0;
-  bool has_pnum_ = false;
-  bool has_time_ = false;
-  int command_count_ = 0;
-  Field command_;
-  // The ends of names and fields, alternately: bit i of word k is byte 64 k + i of fields_. Only
-  // the words that fields_ needs are written or read.
+  struct Facts {
+    Text bytes;
+    Text fields;
+    std::uint64_t time_ms = 0;
+    SessionId sid = no_session;
+    std::uint32_t checksum = 0;
+    std::uint32_t pnum = 0;
+    bool has_pnum = false;
+    bool has_time = false;
+    int command_count = 0;
+    Field command;
+  };
+
+  Facts facts_;
+  // The ends of names and fields, alternately: bit i of word k is byte 64 k + i of the fields. Only
+  // the words that the fields need are written or read.
   static constexpr std::size_t words = max_datagram / 64;
   std::uint64_t ends_[words];
 };
@@ -167,8 +171,8 @@ inline const char* Datagram::Iterator::next_end() {
 }
 
 inline Datagram::Iterator::Iterator(const Datagram& datagram)
-    : at_(datagram.fields_.begin()),
-      end_(datagram.fields_.end()),
+    : at_(datagram.facts_.fields.begin()),
+      end_(datagram.facts_.fields.end()),
       word_(datagram.ends_),
       ends_(datagram.ends_[0]),
       word_begin_(at_) {
@@ -183,6 +187,7 @@ inline void Datagram::Iterator::load() {
 }
 
 // Checks one datagram, with or without a terminator, and on success makes `out` a view of it.
+// Otherwise `out` is unchanged or empty.
 // `syntax` also for a PNum (32 bit) or T (64 bit) that is not a whole number in range. `syntax`
 // also for a SID that is 0 or not 16 hexadecimal digits, and for a duplicate PNum, T or SID.
 R4LINK_API ReadResult read_datagram(Text bytes, Datagram& out);

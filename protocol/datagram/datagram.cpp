@@ -115,17 +115,10 @@ bool read_field(Text text, Field& out) {
 
 Datagram& Datagram::operator=(const Datagram& other) {
   if (this == &other) return *this;
-  bytes_ = other.bytes_;
-  fields_ = other.fields_;
-  time_ms_ = other.time_ms_;
-  sid_ = other.sid_;
-  checksum_ = other.checksum_;
-  pnum_ = other.pnum_;
-  has_pnum_ = other.has_pnum_;
-  has_time_ = other.has_time_;
-  command_count_ = other.command_count_;
-  command_ = other.command_;
-  for (std::size_t word = 0; word * 64 < fields_.size(); ++word) ends_[word] = other.ends_[word];
+  facts_ = other.facts_;
+  for (std::size_t word = 0; word * 64 < facts_.fields.size(); ++word) {
+    ends_[word] = other.ends_[word];
+  }
   return *this;
 }
 
@@ -137,34 +130,36 @@ Field Datagram::find(Text name) const {
 }
 
 Text Datagram::values_at(std::size_t word, std::uint64_t bit) const {
-  const char* const colon = fields_.begin() + word * 64 + lowest_bit(bit);
+  const char* const colon = facts_.fields.begin() + word * 64 + lowest_bit(bit);
   std::uint64_t later = ends_[word] & ~(bit | (bit - 1));
   while (later == 0) later = ends_[++word];
-  return between(colon + 1, fields_.begin() + word * 64 + lowest_bit(later));
+  return between(colon + 1, facts_.fields.begin() + word * 64 + lowest_bit(later));
 }
 
 const char* Datagram::read_short_names(const std::uint64_t* short_names) {
   constexpr Text pnum("PNum");
   constexpr Text sid("SID");
-  for (std::size_t word = 0; word * 64 < fields_.size(); ++word) {
+  for (std::size_t word = 0; word * 64 < facts_.fields.size(); ++word) {
     for (std::uint64_t left = short_names[word]; left != 0; left &= left - 1) {
       const std::uint64_t bit = left & (0 - left);
-      const char* const colon = fields_.begin() + word * 64 + lowest_bit(bit);
+      const char* const colon = facts_.fields.begin() + word * 64 + lowest_bit(bit);
       const char* wrong = nullptr;
-      if (colon - 1 == fields_.begin() || colon[-2] == ';') {
+      if (colon - 1 == facts_.fields.begin() || colon[-2] == ';') {
         const Text name(colon - 1, 1);
         if (name[0] == 'T') {
-          wrong = take_number(name, values_at(word, bit), has_time_, time_ms_);
+          wrong = take_number(name, values_at(word, bit), facts_.has_time, facts_.time_ms);
         } else if (is_command_letter(name[0])) {
-          if (command_count_ == 0) command_ = Field(name, values_at(word, bit));
-          ++command_count_;
+          if (facts_.command_count == 0) facts_.command = Field(name, values_at(word, bit));
+          ++facts_.command_count;
         }
-      } else if (colon - 3 == fields_.begin() || colon[-4] == ';') {
+      } else if (colon - 3 == facts_.fields.begin() || colon[-4] == ';') {
         const Text name(colon - 3, 3);
-        if (name == sid) wrong = take_session_id(name, values_at(word, bit), sid_);
+        if (name == sid) wrong = take_session_id(name, values_at(word, bit), facts_.sid);
       } else {  // four letters
         const Text name(colon - 4, 4);
-        if (name == pnum) wrong = take_number(name, values_at(word, bit), has_pnum_, pnum_);
+        if (name == pnum) {
+          wrong = take_number(name, values_at(word, bit), facts_.has_pnum, facts_.pnum);
+        }
       }
       if (wrong != nullptr) return wrong;
     }
@@ -195,18 +190,21 @@ ReadResult read_datagram(Text bytes, Datagram& out) {
     return fail(ReadError::crc, trailer.digits);
   }
 
-  Datagram datagram;
-  datagram.bytes_ = whole;
-  datagram.fields_ = between(whole.begin(), fields_end);
-  datagram.checksum_ = crc;
+  // Read in place, because copying a newly written datagram takes longer.
+  Datagram::Facts& facts = out.facts_;
+  facts = Datagram::Facts();
+  const Text fields = between(whole.begin(), fields_end);
   std::uint64_t short_names[Datagram::words];
-  if (!mark_fields(datagram.fields_, datagram.ends_, short_names)) {
-    return fail(ReadError::syntax, first_wrong_byte(datagram.fields_));
+  if (!mark_fields(fields, out.ends_, short_names)) {
+    return fail(ReadError::syntax, first_wrong_byte(fields));
   }
-  const char* const wrong = datagram.read_short_names(short_names);
-  if (wrong != nullptr) return fail(ReadError::syntax, wrong);
-  out = datagram;
-  return result;
+  facts.bytes = whole;
+  facts.fields = fields;
+  facts.checksum = crc;
+  const char* const wrong = out.read_short_names(short_names);
+  if (wrong == nullptr) return result;
+  facts = Datagram::Facts();
+  return fail(ReadError::syntax, wrong);
 }
 
 }  // namespace r4

@@ -34,18 +34,25 @@ inline void add_separators(const char* at, unsigned shift, Separators& out) {
 
 }  // namespace
 
-Separators separators(Text block) {
+Separators separators(Text text, std::size_t at) {
   Separators out{0, 0, 0, 0};
   char copy[separators_block];
-  const char* at = block.data();
-  if (block.size() < separators_block) {
+  const char* block = text.data() + at;
+  const std::size_t left = text.size() - at;
+  unsigned surplus = 0;  // bytes before `at`, read so that no byte after the text is read
+  if (text.size() < separators_block) {
     std::memset(copy, 'x', sizeof copy);  // valid in a name and a value, not a separator
-    std::memcpy(copy, at, block.size());
-    at = copy;
+    std::memcpy(copy, block, left);
+    block = copy;
+  } else if (left < separators_block) {
+    surplus = static_cast<unsigned>(separators_block - left);
+    block -= surplus;
   }
-  for (unsigned shift = 0; shift < block.size(); shift += 16)
-    add_separators(at + shift, shift, out);
-  return out;
+  for (unsigned shift = 0; shift < separators_block; shift += 16) {
+    add_separators(block + shift, shift, out);
+  }
+  return {out.colons >> surplus, out.semicolons >> surplus, out.no_name >> surplus,
+          out.no_field >> surplus};
 }
 
 #else
@@ -85,7 +92,8 @@ Half half_separators(const char* at, std::size_t size) {
 
 }  // namespace
 
-Separators separators(Text block) {
+Separators separators(Text text, std::size_t at) {
+  const Text block = text.substr(at, separators_block);
   constexpr std::size_t half = separators_block / 2;
   const std::size_t size = block.size() < half ? block.size() : half;
   const Half low = half_separators(block.data(), size);
@@ -115,7 +123,7 @@ bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names) {
   std::uint64_t name_carry = 0;
   std::uint64_t value_carry = 0;
   for (std::size_t at = 0, word = 0; at < fields.size(); at += separators_block, ++word) {
-    const Separators found = separators(fields.substr(at, separators_block));
+    const Separators found = separators(fields, at);
     const std::uint64_t name = ~(found.colons | found.no_name);
     const std::uint64_t value = ~(found.semicolons | found.no_field);
     const std::uint64_t before = starts;

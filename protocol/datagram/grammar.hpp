@@ -37,7 +37,7 @@ inline const char* skip(std::uint8_t byte_class, const char* at, const char* end
   return at;
 }
 
-// The separators in a block of at most 64 bytes: bit i is byte i.
+// The separators in the 64 bytes of a text from `at` on, or up to its end: bit i is byte at + i.
 struct Separators {
   std::uint64_t colons;
   std::uint64_t semicolons;
@@ -45,7 +45,7 @@ struct Separators {
   std::uint64_t no_field;  // bytes not allowed in a value, except semicolons
 };
 constexpr std::size_t separators_block = 64;
-Separators separators(Text block);
+Separators separators(Text text, std::size_t at);
 
 // Marks in `ends` the colon after each name and the semicolon after each field; in `short_names`
 // the colons one, three or four bytes after a field's beginning. A word has a bit for each of 64

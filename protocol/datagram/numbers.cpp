@@ -77,8 +77,8 @@ inline void put_pair(char* out, std::uint32_t below_100) {
   std::memcpy(out, digit_pairs + 2 * below_100, 2);
 }
 
+// `value` must be at least 100.
 int decimal_digits(std::uint32_t value) {
-  if (value < 100) return value < 10 ? 1 : 2;
   if (value < 10000) return value < 1000 ? 3 : 4;
   if (value < 1000000) return value < 100000 ? 5 : 6;
   if (value < 100000000) return value < 10000000 ? 7 : 8;
@@ -220,6 +220,14 @@ char* write_session_id(char* out, SessionId sid) {
 }
 
 char* write_number(char* out, std::uint32_t value) {
+  if (value < 10) {
+    *out = static_cast<char>('0' + value);
+    return out + 1;
+  }
+  if (value < 100) {
+    put_pair(out, value);
+    return out + 2;
+  }
   char* const end = out + decimal_digits(value);
   char* at = end;
   while (value >= 100) {

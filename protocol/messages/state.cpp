@@ -19,8 +19,6 @@ using Form = FieldForm;
 struct Entry {
   FieldName name;
   FieldForm form = FieldForm::volts;
-  FieldKind kind = FieldKind::count;
-  std::uint8_t channel = 0;
   std::uint16_t place = 0;  // offset in State
 };
 
@@ -34,8 +32,6 @@ struct FieldTable {
       Entry& entry = entries[i];
       entry.name = FieldName(row.name);
       entry.form = kind.form;
-      entry.kind = row.kind;
-      entry.channel = row.channel;
       entry.place = static_cast<std::uint16_t>(kind.place + (row.channel - 1) * kind.size);
     }
   }
@@ -162,8 +158,8 @@ StateField state_field(Text name) {
 
 StateField state_field(FieldKind kind, int channel) {
   for (int i = 0; i < state_field_count; ++i) {
-    const Entry& entry = field_table.entries[i];
-    if (entry.kind == kind && entry.channel == channel) return static_cast<StateField>(i);
+    const StateFieldRow& row = state_fields[i];
+    if (row.kind == kind && row.channel == channel) return static_cast<StateField>(i);
   }
   return StateField::count;
 }
