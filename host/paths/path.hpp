@@ -66,8 +66,8 @@ struct PathBusy {
 struct Path {
   bool up = false;
   bool can_ask = true;
-  bool known = false;  // leads to the session's board
-  bool other = false;
+  bool known = false;       // leads to the session's board
+  bool other = false;       // leads to another board
   bool connecting = false;  // the last heartbeat had `PNum:0`
   std::uint32_t boot = 0;
   PathClock clock;

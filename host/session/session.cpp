@@ -195,7 +195,8 @@ PostResult Session::post(const Command& command, Time now) {
 
 PostResult Session::posted() {
   const PostResult result = posts_.result();
-  if (result && posts_.is_clear()) commands_.forget_stop();  // the posted E:CLEAR clears the stop
+  // A repeated stop would undo the E:CLEAR.
+  if (result && posts_.is_clear()) commands_.forget_stop();
   return result;
 }
 

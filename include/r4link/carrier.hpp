@@ -37,6 +37,7 @@ enum class TransportTrouble : std::uint8_t {
   foreign_frames,
   late_frames,  // flow control arrives too late, so frames wait or are lost
 };
+// "none", "foreign frames", "late frames".
 R4LINK_API const char* to_text(TransportTrouble trouble);
 
 // Counters of the transfers in both directions, if a datagram is sent in several frames (CAN).
@@ -107,6 +108,7 @@ struct CarrierEvent {
   Problem problem;  // for up: only `thing`, the transport
 };
 
+// "up", "down", "warning"; "unknown" for other numbers.
 constexpr const char* to_text(CarrierEvent::Kind kind) {
   switch (kind) {
     case CarrierEvent::Kind::up:

@@ -97,6 +97,7 @@ struct FleetEvent {
   RefusedPost refused{};
   std::uint64_t count = 0;
 };
+// "link", "transport", "arming", "restart", "refused", "missed"; "unknown" for other numbers.
 constexpr const char* to_text(FleetEvent::Kind kind) {
   switch (kind) {
     case FleetEvent::Kind::link:

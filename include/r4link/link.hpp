@@ -95,6 +95,7 @@ enum class PathState : std::uint8_t {
   silent,       // the board has been silent for the timeout
   carrying,
 };
+// "down", "asking", "other board", "silent", "carrying".
 R4LINK_API const char* to_text(PathState state);
 
 struct LinkStatus {

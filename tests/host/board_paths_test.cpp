@@ -11,6 +11,7 @@
 #include <fstream>
 #include <memory>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -138,6 +139,33 @@ TEST(BoardPaths, ContinueIfALaterDeviceOfAPathIsInvalid) {
   std::filesystem::remove(link);
   board.osmc(1).set_pwm(100, Direction::forward);
   EXPECT_EQ(board.link().carrying, 1);
+}
+
+// The first three openings fail, the second one with an exception that is not an Error.
+class OpensAtLast final : public IdleCarrier {
+ public:
+  explicit OpensAtLast(int& openings) : openings_(openings) {}
+  void open(Handler& handler) override {
+    ++openings_;
+    if (openings_ == 2) throw std::runtime_error("not an Error");
+    if (openings_ < 4) throw Error(ErrorKind::open, "path 2", "it is missing", "plug it in");
+    IdleCarrier::open(handler);
+  }
+
+ private:
+  int& openings_;
+};
+
+TEST(AsyncBoardPaths, ReopenAPathAfterAnyExceptionOfItsTransport) {
+  OnALoop loop;
+  int openings = 0;
+  std::vector<std::unique_ptr<Carrier>> carriers;
+  carriers.push_back(std::make_unique<IdleCarrier>());
+  carriers.push_back(std::make_unique<OpensAtLast>(openings));
+  AsyncBoard board(loop.io, std::move(carriers), at_will());
+  board.open();
+  EXPECT_THROW(static_cast<void>(loop.run_until([] { return false; })), std::runtime_error);
+  EXPECT_TRUE(loop.run_until([&] { return openings == 4; }));
 }
 
 // One end of a memory carrier, which the test can cut with or without an event.

@@ -36,6 +36,12 @@ def a_missing_library_is_named_with_its_option_and_its_packages():
     assert '-DR4_ROS2=OFF' in said and 'cyclonedds-dev' in said, said
 
 
+def missing_dygraphs_are_named_with_their_option_and_package():
+    works, said = configure('-DR4_ROS2=OFF', '-DCMAKE_IGNORE_PATH=/usr/share/javascript/dygraphs')
+    assert not works and 'dygraph.min.js was not found' in said, said
+    assert '-DR4_DYGRAPHS=FOLDER' in said and 'libjs-dygraphs' in said, said
+
+
 def a_cross_build_makes_the_manual_by_the_r4_that_it_built():
     with tempfile.TemporaryDirectory() as folder:
         ended = subprocess.run(['cmake', '--preset', 'release', '-B', folder, '-DR4_TESTS=OFF', '-DR4_PYTHON=OFF',
@@ -70,6 +76,7 @@ def the_oldest_cmake_is_enough():
 
 failed = 0
 for test in (a_build_needs_no_library_of_what_it_leaves_out, a_missing_library_is_named_with_its_option_and_its_packages,
+             missing_dygraphs_are_named_with_their_option_and_package,
              a_cross_build_makes_the_manual_by_the_r4_that_it_built, an_asio_that_is_too_old_is_named, the_oldest_cmake_is_enough):
     name = test.__name__.replace('_', ' ')
     try:

@@ -138,6 +138,24 @@ def test_the_page_loads_fast_and_shows_states_at_once(browser):
         assert page.errors() == []
 
 
+ROWS = """import('./plots.js').then(({rows_of}) => rows_of(%s, 100).map((row) => row.map(
+    (value) => Number.isNaN(value) ? 'gap' : value)))"""
+
+
+def test_plots_keep_spikes_and_show_gaps(browser):
+    """A row has a time and the values. Here a pixel is 100 ms wide."""
+    with one_board(browser) as (_, _, page):
+        # Ten states in one pixel become two rows: the lowest and the highest value, in their order.
+        assert page.evaluate(ROWS % '[[0, 10, 20, 30, 40, 50, 60, 70, 80, 90], [5, 5, 99, 5, 5, 5, 5, 1, 5, 5]]') == [
+            [0, 99], [90, 1]]
+        # Without a state for more than 500 ms, the line breaks. One missing value does not break a line.
+        assert page.evaluate(ROWS % '[[0, 100, 700], [1, 2, 3]]') == [[0, 1], [100, 2], [101, 'gap'], [700, 3]]
+        assert page.evaluate(ROWS % '[[0, 100, 200], [1, NaN, 3]]') == [[0, 1], [100, None], [200, 3]]
+        # A field that is missing for more than 500 ms breaks its own line only.
+        assert page.evaluate(ROWS % '[[0, 400, 800], [1, 2, 3], [7, NaN, NaN]]') == [[0, 1, 7], [400, 2, None], [800, 3, 'gap']]
+        assert page.evaluate(ROWS % '[[], []]') == []
+
+
 def test_plots_can_be_paused_zoomed_and_read(browser):
     with one_board(browser) as (_, _, page):
         page.click('#pause')

@@ -129,11 +129,13 @@ Problem can_problem(const std::string& interface, int error) {
                       "ip link set {0} up",
                       interface)};
     case ENETDOWN:
-      return {ErrorKind::open, thing, "the interface is down",
-              fmt::format("ip link set {} up{}", interface,
-                          can_interface(interface).has_controller
-                              ? " txqueuelen 1000 type can bitrate 1000000 restart-ms 100"
-                              : "")};
+      return {
+          ErrorKind::open, thing, "the interface is down",
+          fmt::format(
+              "ip link set {} up{}", interface,
+              can_interface(interface).has_controller
+                  ? " txqueuelen 1000 type can bitrate 1000000 sample-point 0.875 restart-ms 100"
+                  : "")};
     case EPERM:
     case EACCES:
       return {ErrorKind::permission, thing, std::strerror(error),

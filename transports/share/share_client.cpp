@@ -66,11 +66,10 @@ void ShareClient::look_for_answer() {
 }
 
 Problem ShareClient::silence() const {
-  const std::string pid = process_ == 0 ? "" : fmt::format(" {}", process_);
-  return {ErrorKind::open, "",
-          fmt::format("the program that holds it{} does not answer",
-                      pid.empty() ? "" : fmt::format(" (pid{})", pid)),
-          fmt::format("let it go on, if it was stopped (kill -CONT{}), or end it", pid)};
+  const std::string pid = process_ == 0 ? "" : fmt::format(" (pid {})", process_);
+  const std::string resume = process_ == 0 ? "fg" : fmt::format("kill -CONT {}", process_);
+  return {ErrorKind::open, "", fmt::format("the program that holds it{} does not answer", pid),
+          fmt::format("let it go on, if it was stopped ({}), or end it", resume)};
 }
 
 SendResult ShareClient::send_stop(std::string_view datagram) {

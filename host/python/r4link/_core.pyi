@@ -565,7 +565,7 @@ class Discovery:
         """True if more than 64 boards have answered by UDP."""
     def only(self) -> FoundBoard:
         """The only board, even on several transports. Raises OpenError without a board, and
-        UsageError with the URLs of several boards."""
+        UsageError with the URLs if there are two boards or more."""
 
 def discover(*, serial: bool = True, can: bool = True, udp: bool = True, serial_ports: Sequence[str] = (),
              udp_port: int = 2018) -> Discovery:

@@ -120,7 +120,7 @@ class Board(AnyBoard[None]):
     @classmethod
     def first(cls, **options: Any) -> Self:
         """Opens the only board that r4link.discover() finds within 1.3 s. Raises OpenError without
-        a board, and UsageError with the URLs of several boards."""
+        a board, and UsageError with the URLs if there are two boards or more."""
         return cls(_core.discover().only().url, **options)
 
     def _call(self, call: Callable[[_core.Board], Any],

@@ -51,6 +51,7 @@ R4LINK_API CommandOrGroup parse_text(std::string_view text);
 
 // "O:358,1,1". Empty if a text of the command has bytes that a datagram cannot hold.
 R4LINK_API std::string to_text(const Command& command);
+// "O:358,1,1;O:358,1,2".
 R4LINK_API std::string to_text(const Setpoints& group);
 
 // The text for people and logs: printable(), and without a secret: "C:password,...", "C:key,1:...".

@@ -22,6 +22,7 @@ enum class Status : std::uint8_t {
   skipped,      // by the person
   unsupported,  // this board or transport does not support the check: `note`
 };
+// "not done", "passed", "found", "skipped", "unsupported".
 R4LINK_API const char* to_text(Status status);
 
 struct Measured {

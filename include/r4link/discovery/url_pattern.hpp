@@ -34,7 +34,7 @@ constexpr std::size_t most_pattern_urls = 10'000;
 // The URLs that a pattern stands for, in order; a URL stands for itself. Throws Error{usage} for
 // invalid braces and ranges, for more than most_pattern_urls, and if a result is not a valid URL.
 R4LINK_API std::vector<PatternUrl> expand_urls(std::string_view pattern);
-// The URLs of several patterns. Also throws Error{usage} for a duplicate URL.
+// The URLs of all patterns. Also throws Error{usage} for a duplicate URL.
 R4LINK_API std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
 
 // The URLs that a text joins, without a check.

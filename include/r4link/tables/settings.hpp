@@ -19,7 +19,7 @@ enum class Setting : std::uint8_t {
 };
 
 struct SettingRow {
-  Text key;  // the first of several keys
+  Text key;  // the first key, if the setting has more than one
   Setting setting;
   std::uint8_t keys;  // number of keys
   // Range of a number, or of a text's size in bytes. Both 0: a word.

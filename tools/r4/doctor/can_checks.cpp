@@ -30,9 +30,10 @@ Finding down(const Machine& machine, const CanInterface& interface) {
   } else if (interface.bit_rate == 0) {
     finding.reason +=
         ", and has no bit rate; 1000000 is what boards have where nobody has changed it";
-    finding.fix = machine.as_root(
-        fmt::format("ip link set {} up txqueuelen 1000 type can bitrate 1000000 restart-ms 100",
-                    interface.name));
+    finding.fix =
+        machine.as_root(fmt::format("ip link set {} up txqueuelen 1000 type can bitrate 1000000 "
+                                    "sample-point 0.875 restart-ms 100",
+                                    interface.name));
   } else {
     finding.reason += fmt::format("; its bit rate is {}", interface.bit_rate);
     finding.fix = machine.as_root(

@@ -56,8 +56,8 @@ int give(const KeyOptions& options) {
   // A board in the safe state also accepts a key.
   board.setting("key", {text.data(), text.size()}, std::chrono::seconds{5});
   print_text(
-      "the board has key {} now: from networks and buses it obeys only who has it, stops "
-      "excepted\n",
+      "the board has key {}. From networks and buses it obeys only hosts with this key, and every "
+      "stop\n",
       key.id);
   return 0;
 }
@@ -71,9 +71,9 @@ int keys(const KeyOptions& options) {
 }
 
 constexpr const char* key_footer =
-    R"(A board with a key obeys only hosts that have it, too: with --key FILE, or R4_KEY=FILE in the
-environment, r4 signs its heartbeats and commands. An emergency stop needs no key. Whoever is at
-the board's USB cable needs none either, and can set one.
+    R"(A board with a key obeys only hosts that have the key: with --key FILE, or R4_KEY=FILE in the
+environment, r4 signs its heartbeats and commands. An emergency stop needs no key. A host at the
+board's USB cable needs no key, and can set one.
 
 A key has an id, 1 to 9; a board holds up to four. Give each host its own, so that one can be
 taken away: r4 send serial:auto C:key,2:off

@@ -53,7 +53,7 @@ CLI::Option* add_number(CLI::App& command, const std::string& name,
 
 CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
 
-// '+' joins the URLs of several paths to one board (r4link/discovery/url_pattern.hpp). For
+// '+' joins the URLs of the paths to one board (r4link/discovery/url_pattern.hpp). For
 // add_paths(), which takes one board, each URL is a path; for add_boards() each URL is a board:
 //     r4 stop serial:auto udp://192.168.0.125   =   r4 stop serial:auto+udp://192.168.0.125
 CLI::Option* add_paths(CLI::App& command, std::vector<std::string>& out);

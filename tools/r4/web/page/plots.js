@@ -33,7 +33,7 @@ function extremes(values, from, end) {
 
 // Rows for Dygraphs, at most two a pixel, with the extremes of its states. A null joins the values
 // beside it, a NaN does not.
-function rows_of([times, ...columns], pixel_ms) {
+export function rows_of([times, ...columns], pixel_ms) {
   const rows = [];
   const seen_ms = columns.map(() => -Infinity);
   const pixel_at = (i) => Math.floor(times[i] / pixel_ms);
