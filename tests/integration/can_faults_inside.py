@@ -100,7 +100,7 @@ def test_r4_bus_asks_for_a_bit_rate_that_the_adapter_does_not_report():
         os.close(near)
         os.close(far)
     assert guessed.returncode == 0 and '1000 kbit/s' in guessed.stdout, guessed
-    assert re.fullmatch('r4: warning: .* does not tell its bit rate, .*; add --bitrate\n', guessed.stderr), guessed
+    assert re.fullmatch('r4: warning: .* does not report its bit rate, .*; add --bitrate\n', guessed.stderr), guessed
     assert given.returncode == 0 and given.stderr == '' and '500 kbit/s' in given.stdout, given
     assert re.search(f'{name} .* no bit rate', listed.stdout) and listed.stderr == '', listed
 

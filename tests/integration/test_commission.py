@@ -195,7 +195,7 @@ def test_a_terminal_takes_numbers_and_choices_and_can_be_left(board, tmp_path):
     with Terminal(board.host_url, '--report', f'{tmp_path}/r.html', *only) as terminal:
         terminal.answer('supply is OFF', 'y')
         terminal.answer('multimeter show', 'abc\n')
-        terminal.answer("'abc' is not one of these", '24.2\x7f23\n')
+        terminal.answer("'abc' is not a valid answer", '24.2\x7f23\n')
         terminal.until('meter: 24.23 V')
         terminal.answer('clear the fault', 'y')
         terminal.until('HOLD the space bar[^$]*leave: ')

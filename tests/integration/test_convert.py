@@ -50,7 +50,7 @@ def convert(source, target, *options, code=0):
 def test_pandas_reads_csv_with_the_right_types(native, tmp_path):
     said = convert(native, tmp_path / 'drive.csv').stdout
     table = pandas.read_csv(tmp_path / 'drive.csv')
-    assert f'73 records; left out are {73 - len(table)} that are not states' in said
+    assert f'73 records; left out are {73 - len(table)} records that are not states' in said
     kinds = {name: kind.kind for name, kind in table.dtypes.items()}
     assert kinds['time [s]'] == kinds['AIN24 [V]'] == 'f'
     for name in ('path', 'PNum', 'T [ms]', 'DMHSTA [0/1/2]', 'OSMC1 pwm [0-4095]', 'STEP1POS [steps]'):
@@ -207,7 +207,7 @@ def test_convert_reads_a_pipe_and_replaces_a_file_only_with_force(native, tmp_pa
     assert run('convert', '-', '-o', str(target), stdin=native.read_text()).returncode == 0
     assert len(target.read_text().splitlines()) == 73
     refused = convert(native, target, code=OPEN).stderr
-    assert ERROR.search(refused) and 'is there already' in refused and '--force' in refused
+    assert ERROR.search(refused) and 'already exists' in refused and '--force' in refused
     convert(native, native, '--force')
     assert native.read_text() == capture(tmp_path / 'same.r4log').read_text()
 
@@ -261,10 +261,10 @@ def claims(ending):
     frame = b'\x28\xb5\x2f\xfd'
     return {
         '.mcap': [(mcap + b'\x06' + struct.pack('<Q', much), 'a record of more than 256 MiB'),
-                  (mcap + b'\x06' + struct.pack('<Q', len(chunk)) + chunk, 'a chunk that is not whole')],
-        '.pcapng': [(section + struct.pack('<II', 6, most) + bytes(100), 'no block of pcapng')],
+                  (mcap + b'\x06' + struct.pack('<Q', len(chunk)) + chunk, 'an incomplete chunk')],
+        '.pcapng': [(section + struct.pack('<II', 6, most) + bytes(100), 'not a block of pcapng')],
         '.pcap': [(struct.pack('<IIQIIIIII', 0xA1B2C3D4, 0x40002, 0, most, 228, 1, 0, most, most) + bytes(100),
-                   'no packet is that long')],
+                   'the length of a packet is not valid')],
         # A frame of 100 GB, a frame with a window of 2 GiB, a line of 100 MB.
         '.r4log.zst': [(begins + frame + b'\xe0' + struct.pack('<Q', much) + bytes(100), 'a zstd frame that needs a window'),
                        (begins + frame + b'\0\xa8' + bytes(100), 'a zstd frame that needs a window'),

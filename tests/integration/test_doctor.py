@@ -77,7 +77,7 @@ def test_doctor_reports_a_silent_board_and_a_missing_port(tmp_path):
     code, found = doctor('udp://127.0.0.1:9?listen=0', '--duration', '0.1')
     assert code == REFUSED and found['link.silent']['severity'] == 'error'
     code, found = doctor(f'serial://{tmp_path}/none', '--duration', '0.1')
-    assert code == OPEN and found['serial.permission']['reason'] == 'there is no such port'
+    assert code == OPEN and found['serial.permission']['reason'] == 'the port does not exist'
 
 
 def test_doctor_runs_no_program_of_the_working_directory(tmp_path):

@@ -69,5 +69,5 @@ def test_a_device_is_not_set_up_before_the_board_is_armed():
     domain = own_domain()
     with Board('udp://127.0.0.1:0', options=('--device', 'bno055')) as board:
         with Ros2(domain, board.host_url, '--device', 'bno055') as ros2:
-            ros2.logged('bno055@0x28: it is set up once the board is armed')
+            ros2.logged('bno055@0x28: it is not set up before the board is armed')
             assert ros2.end() == 0, ros2.errors

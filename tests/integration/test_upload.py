@@ -84,7 +84,7 @@ def test_stops_the_board_writes_the_sketch_and_reports_the_version(place):
 def test_serial_auto_writes_a_board_in_its_boot_loader_at_once(place):
     (place / 'there').write_text('1')
     done = run('upload', str(place / 'sketch.bin'), 'serial:auto', '--timeout', '0.2')
-    assert done.returncode == 3 and 'is written' in done.stdout and 'no R4 firmware answers' in done.stderr
+    assert done.returncode == 3 and 'is written' in done.stdout and 'R4 firmware does not answer' in done.stderr
     assert 'the board reports that its outputs' not in done.stdout
     assert len(calls(place)) == 3 and calls(place)[-1].startswith(WRITE)
 
@@ -104,7 +104,7 @@ def test_a_board_with_other_firmware_is_opened_at_1200_baud(place):
     done = run('upload', str(place / 'sketch.bin'), f'serial://{os.ttyname(port)}', '--timeout', '0.2')
     os.close(board)
     os.close(port)
-    assert done.returncode == 3 and 'no R4 firmware answers' in done.stderr and ERROR.search(done.stderr)
+    assert done.returncode == 3 and 'R4 firmware does not answer' in done.stderr and ERROR.search(done.stderr)
     assert 'cannot switch outputs off' in done.stdout
     assert (place / 'speed').read_text().strip() == '1200'
     assert calls(place)[-1].startswith(WRITE)
@@ -140,7 +140,7 @@ def test_upload_names_the_reason_for_a_failure(place):
     (place / 'there').write_text('2')
     (place / 'paths').write_text('1-2 1-3')
     done = upload(place)
-    assert done.returncode == 2 and 'several boards' in done.stderr
+    assert done.returncode == 2 and 'two or more boards' in done.stderr
     (place / 'calls').unlink()
     (place / 'denied').touch()
     done = upload(place)

@@ -6,9 +6,10 @@
 namespace r4::tool::ros2 {
 
 int run_bridge(const BridgeOptions&) {
-  throw Error(ErrorKind::unsupported, "r4 ros2", "this build of r4 does not have it (R4_ROS2=OFF)",
-              "install Cyclone DDS 0.9 or newer (cyclonedds-dev, cyclonedds-tools; that of Ubuntu "
-              "22.04 is too old), and build r4 with cmake -DR4_ROS2=ON");
+  throw Error(
+      ErrorKind::unsupported, "r4 ros2", "this build of r4 does not include it (R4_ROS2=OFF)",
+      "install Cyclone DDS 0.9 or newer (cyclonedds-dev, cyclonedds-tools; the version in Ubuntu "
+      "22.04 is too old), and build r4 with cmake -DR4_ROS2=ON");
 }
 
 }  // namespace r4::tool::ros2

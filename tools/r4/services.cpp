@@ -42,13 +42,13 @@ std::vector<std::string> command_line() {
     if (errno != ENOENT) {
       throw Error(ErrorKind::permission, program.string(),
                   "cannot be run: " + std::system_category().message(errno),
-                  "see its rights, or install r4 again");
+                  "check its permissions, or install r4 again");
     }
   }
   throw Error(ErrorKind::unsupported, "r4-services",
-              "this part of r4 is neither at " + folder.string() + "/r4-services nor at " +
+              "this part of r4 is missing at " + folder.string() + "/r4-services and at " +
                   (folder / R4_SERVICES_FROM_BIN).lexically_normal().string(),
-              "install r4 as a whole, with cmake --install or as a package");
+              "install all parts of r4, with cmake --install or as a package");
 }
 
 }  // namespace

@@ -88,7 +88,7 @@ TEST(DoctorCan, FramesOfAnotherProtocolOnAnIdOfTheBoardAreNamed) {
   ASSERT_EQ(findings.size(), 1U) << "the other ids do not belong to board 5";
   EXPECT_EQ(findings[0].severity, Severity::warning);
   EXPECT_EQ(findings[0].reason,
-            "1 frames with id 185, which is one of board 5, make no R4 datagram: CANopen TPDO1 of "
+            "1 frames with id 185, an id of board 5, are not R4 datagrams: CANopen TPDO1 of "
             "node 5, or ODrive axis 12");
 }
 

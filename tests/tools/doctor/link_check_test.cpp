@@ -30,9 +30,10 @@ std::string verdict(const LinkSample& sample) {
 }
 
 TEST(DoctorLink, IsOkWithStatesAndAnAnswerInTime) {
-  EXPECT_EQ(verdict(well()),
-            "ok link: 500 states in 5.0 s, 0 lost, none damaged, jitter 0.0 ms; it answers in 0.6 "
-            "ms\n");
+  EXPECT_EQ(
+      verdict(well()),
+      "ok link: 500 states in 5.0 s, 0 lost, 0 damaged, jitter 0.0 ms; the board answers in 0.6 "
+      "ms\n");
 }
 
 TEST(DoctorLink, JudgesLossDamageAndJitter) {
@@ -55,8 +56,7 @@ TEST(DoctorLink, IsAnErrorWithoutAnyState) {
   LinkSample sample = well();
   sample.states = 0;
   EXPECT_EQ(verdict(sample),
-            "error link.states: 510 datagrams came in 5.0 s, and none is a state: the link's "
-            "reason\n");
+            "error link.states: 510 datagrams arrived in 5.0 s, but no state: the link's reason\n");
 }
 
 TEST(DoctorLink, IsAnErrorIfTheBoardDoesNotAnswer) {
@@ -64,7 +64,7 @@ TEST(DoctorLink, IsAnErrorIfTheBoardDoesNotAnswer) {
   sample.answered = Answered::no;
   sample.answer_us = 0;
   EXPECT_EQ(verdict(sample),
-            "error link.answer: the board does not answer a question: it does not hear this "
+            "error link.answer: the board does not answer: it does not receive datagrams from this "
             "computer\n");
   sample.trouble = TransportTrouble::foreign_frames;
   EXPECT_EQ(verdict(sample), "error link.answer: the link's reason\n");
@@ -83,8 +83,8 @@ TEST(DoctorLink, IsANoteIfTheBoardWasNotAsked) {
   sample.answered = Answered::not_asked;
   sample.answer_us = 0;
   EXPECT_EQ(verdict(sample),
-            "note link: 500 states in 5.0 s, 0 lost, none damaged, jitter 0.0 ms; it was not asked "
-            "whether it hears this computer\n");
+            "note link: 500 states in 5.0 s, 0 lost, 0 damaged, jitter 0.0 ms; the board was not "
+            "asked for an answer\n");
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ TEST(Csv, HasARowForEachStateAndAColumnForEachValue) {
   // Damaged datagrams and datagrams that are not states are counted.
   const auto states = lines.size() - 1;
   EXPECT_EQ(csv.left_out,
-            std::to_string(paper_capture().size() + 2 - states) + " that are not states");
+            std::to_string(paper_capture().size() + 2 - states) + " records that are not states");
   EXPECT_GT(states, 50);
   for (const std::string& line : lines) {
     EXPECT_EQ(std::count(line.begin(), line.end(), ','), 16) << line;
@@ -93,7 +93,7 @@ TEST(Csv, HasNoRowForAStateWithAnInvalidNumber) {
   // The checksum is right, but the column must contain only numbers.
   const Converted csv = converted(one_state("AIN24:abc;PNum:1;T:2;"), ".r4log", ".csv");
   EXPECT_EQ(lines_of(csv.bytes).size(), 1);
-  EXPECT_EQ(csv.left_out, "1 that are not states");
+  EXPECT_EQ(csv.left_out, "1 records that are not states");
 }
 
 TEST(Csv, HasTheReadingsOfDescribedDevices) {

@@ -56,7 +56,7 @@ TEST(Mcap, ReadsTheWholeChunksOfATornFile) {
   const std::string mcap = converted(native, ".r4log", ".mcap").bytes;
   const Converted back = converted(mcap.substr(0, mcap.size() * 3 / 4), ".mcap", ".r4log");
   ASSERT_EQ(back.damage.size(), 1);
-  EXPECT_TRUE(contains(back.damage[0].reason, "not whole"));
+  EXPECT_TRUE(contains(back.damage[0].reason, "incomplete"));
   EXPECT_GT(back.bytes.size(), native.size() / 4);
   EXPECT_TRUE(native.starts_with(back.bytes));
 }
@@ -86,7 +86,8 @@ TEST(Mcap, NamesATopicByTheBoardFromTheBeginning) {
 TEST(Mcap, RefusesInvalidFilesAndTooLargeTimes) {
   for (const std::string& file : {std::string(), std::string("\x89MCAP"), std::string(100, 'x'),
                                   std::string("\x89MCAP0\r\n") + std::string(50, '\xFF')}) {
-    EXPECT_EQ(problem_of([&] { converted(file, ".mcap", ".r4log"); }).reason, "no MCAP file");
+    EXPECT_EQ(problem_of([&] { converted(file, ".mcap", ".r4log"); }).reason,
+              "is not an MCAP file");
   }
   const std::string foreign =
       std::string("\x89MCAP0\r\n\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 25);

@@ -137,7 +137,7 @@ TEST(Pcap, RefusesACaptureWithoutABoardAndNamesItsContents) {
   const auto problem = [](const std::string& file) {
     const Problem found = problem_of([&] { converted(file, ".pcap", ".r4log"); });
     EXPECT_EQ(found.kind, ErrorKind::data);
-    EXPECT_TRUE(contains(found.reason, "no datagram of a board is in it")) << found.reason;
+    EXPECT_TRUE(contains(found.reason, "does not contain a datagram of a board")) << found.reason;
     return found.reason + "; " + found.fix;
   };
   const std::string state = captured_state();
@@ -145,7 +145,7 @@ TEST(Pcap, RefusesACaptureWithoutABoardAndNamesItsContents) {
   EXPECT_TRUE(contains(elsewhere, "port 2018, but of: 3018, 2390")) << elsewhere;
   EXPECT_TRUE(contains(elsewhere, "--port"));
   const std::string unread = problem(pcap(ByteOrder::little, 127, std::string(100, 'r')));
-  EXPECT_TRUE(contains(unread, "link types that are not read: 127 (802.11")) << unread;
+  EXPECT_TRUE(contains(unread, "link types that r4 does not read: 127 (802.11")) << unread;
   const std::string empty = pcap(ByteOrder::little, 228, "").substr(0, 24);
   EXPECT_TRUE(contains(problem(empty), "0 packets"));
 }
@@ -368,7 +368,7 @@ TEST(Pcap, ReportsTheOffsetOfACutOrTooLongPacket) {
   huge.replace(32, 4, "\xFF\xFF\xFF\x7F");
   const Converted none = converted(huge, ".pcap", ".r4log");
   ASSERT_EQ(none.damage.size(), 1);
-  EXPECT_TRUE(contains(none.damage[0].reason, "no packet is that long"));
+  EXPECT_TRUE(contains(none.damage[0].reason, "the length of a packet is not valid"));
 }
 
 TEST(Pcap, RefusesAFileThatIsNotACapture) {
@@ -376,7 +376,7 @@ TEST(Pcap, RefusesAFileThatIsNotACapture) {
        {std::string(), std::string("\x0A\x0D\x0D\x0A"), std::string(100, 'x'),
         std::string("\x0A\x0D\x0D\x0A") + std::string(100, '\0')}) {
     EXPECT_EQ(problem_of([&] { converted(file, ".pcapng", ".r4log"); }).reason,
-              "no capture of packets");
+              "is not a capture of packets");
   }
 }
 

@@ -40,9 +40,10 @@ void BoardSet::require_heard() const {
     const Statistics statistics = each.board.statistics();
     if (statistics.received != 0) continue;
     if (statistics.damaged == 0) throw Error(explain(each.url, each.board.link()));
-    throw Error(ErrorKind::refused, each.url,
-                fmt::format("{} datagrams came, none of them valid", statistics.damaged),
-                "see that it is an R4 board, and that both ends have the same speed");
+    throw Error(
+        ErrorKind::refused, each.url,
+        fmt::format("all {} datagrams were damaged", statistics.damaged),
+        "check that the URL leads to an R4 board, and that both ends have the same baud rate");
   }
 }
 

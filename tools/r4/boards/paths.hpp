@@ -64,7 +64,7 @@ inline void tell_paths_down(const std::vector<PathStatus>& paths, bool json) {
       line["type"] = "path";
       print_line(line);
     } else {
-      print_trouble(fmt::format("r4: {} is down, so that nothing went by it", path.name));
+      print_trouble(fmt::format("r4: {} is down, so this path carried no datagrams", path.name));
     }
   }
 }

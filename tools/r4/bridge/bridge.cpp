@@ -94,7 +94,7 @@ class Report {
   void end() const {
     const std::uint64_t lost = lines_.lost();
     if (lost == 0) return;
-    print_trouble("r4: {} lines were left out: the reader of the output is too slow", lost);
+    print_trouble("r4: {} lines were dropped, because the reader of the output is too slow", lost);
   }
 
  private:
@@ -155,29 +155,30 @@ int bridge(const Options& options) {
 
 constexpr const char* footer =
     R"(The first URL is where hosts connect, as for r4 sim; the second URL is the board's, as for r4 send. So any
-tool that speaks UDP drives a board on USB or CAN (docs/how-to/bridge.md). Datagrams pass unchanged. The
+tool that speaks UDP can drive a board on USB or CAN (docs/how-to/bridge.md). Datagrams pass unchanged. The
 bridge sends nothing for a silent host: a board behind a bridge goes safe like any other board.
 
 The bridge serves up to 16 hosts, and the board decides which host controls it. Hosts without a session id
-(the paper's) pass one at a time: the next one when the first was silent for --timeout. A stop from any host
-passes first. A datagram that has waited for 0.1 s is dropped. The bridge waits for a board that is absent.
+(as in the paper) pass one at a time: the next host passes after the first host has been silent for
+--timeout. A stop from any host passes first. A datagram that has waited for 0.1 s is dropped. If the board
+is absent, the bridge waits for the board.
 
-A board obeys its own cable without a key. To a board at a serial port that has a key, a bridge
-therefore passes only what is signed with it, and needs the key for that: --key FILE. Without a key
-it listens to this computer alone; --open lets everyone who reaches it drive the board. What only a
-cable may set (C:key, C:network, C:password and the like) never passes.
+A board obeys commands from its own cable without a key. So if a board at a serial port has a key, the
+bridge passes only signed datagrams. The bridge needs the key to check them: --key FILE. Without --key, a
+bridge to a serial port accepts only hosts on this computer; with --open, every host that reaches the bridge
+may drive the board. Settings that need a cable (C:key, C:network, C:password and others) never pass.
 
-On standard error it tells which transports come and go, and every ten seconds, if that has changed, and at
-the end what came from each side and was passed or dropped, and why; with --json on standard output, one
-object a line:
-  {"type":"bridge","hosts":…,"board":…}                             of each board, at the beginning
+The bridge reports on standard error when a transport connects or disconnects. Every ten seconds, and at the
+end, it reports changed counters: the datagrams from each side that it passed, or dropped and why. With
+--json it reports on standard output, one object a line:
+  {"type":"bridge","hosts":…,"board":…}                             for each board, at the start
   {"type":"transport","event":"up|down|warning","side":"hosts|board","thing":…,"reason":…,"fix":…}
   {"type":"counters","side":…,"transport":…,"up":…,"passed":…,"stops":…,"damaged":…,"misdirected":…,
    "kept_out":…,"refused":…,"late":…,"undelivered":…,"outdated":…}
 
 Examples:
   r4 bridge udp:// serial:auto                        for programs of this computer
-  r4 bridge udp://0.0.0.0:2018 'can://can0?node=3'    for the network: anybody there may drive the board
+  r4 bridge udp://0.0.0.0:2018 'can://can0?node=3'    for the network: any host there may drive the board
   r4 bridge udp://0.0.0.0:2018 serial:auto --key /etc/r4link/key    for hosts that have the key
   r4 bridge udp://0.0.0.0:2100-2107 'can://can0?node=0-7'
   r4 bridge pty:/tmp/r4 udp://192.168.0.125           a serial port for a board on WiFi
@@ -190,18 +191,19 @@ void add_bridge(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(
       root, chosen, "bridge", "Carry datagrams between hosts and a board", footer, options, bridge);
-  add_text(*command, "HOSTS", options->hosts, "where hosts are heard, such as udp://0.0.0.0:2018",
-           url_type, Need::required);
+  add_text(*command, "HOSTS", options->hosts,
+           "the URL to which hosts connect, such as udp://0.0.0.0:2018", url_type, Need::required);
   add_text(*command, "BOARD", options->board, "the board, such as can://can0?node=3", url_type,
            Need::required);
-  add_json(*command, options->json, "print what happens as JSON, one object a line");
-  add_seconds(*command, "--every", options->every, "tell what passed so often (default 10)");
+  add_json(*command, options->json, "print events and counters as JSON, one object a line");
+  add_seconds(*command, "--every", options->every,
+              "how often to report changed counters (default 10)");
   add_seconds(*command, "--timeout", options->timeout,
-              "a host makes room for another after so long: the board's timeout (default 1)");
+              "silence before another host is served: the board's timeout (default 1)");
   add_duration(*command, options->duration);
   add_keys(*command, options->keys);
   add_flag(*command, "--open", options->open,
-           "let everyone who reaches HOSTS drive a board at a serial port, without its key");
+           "let every host at HOSTS drive a board at a serial port without its key");
 }
 
 }  // namespace r4::tool

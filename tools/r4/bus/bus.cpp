@@ -41,7 +41,7 @@ BusPlan plan_of(const Options& options) {
   const std::uint64_t data_rate = options.data_bit_rate.value_or(usual_data_rate);
   if (options.data_bit_rate && !options.fd) {
     throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", data_rate),
-                "classic frames have one bit rate only", "add --fd, or leave it out");
+                "classic frames have one bit rate only", "add --fd, or remove --dbitrate");
   }
   if (options.fd && data_rate < bit_rate) {
     throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", data_rate),
@@ -85,7 +85,7 @@ void print_table(const BusPlan& plan, const Options& options, const BusLoad& loa
   print_text("{}\n\n", plan_text(plan, options));
   print_text("{:<16}{:>10}{:>8}{:>10}{:>11}{:>11}{:>10}\n", "", "datagrams", "bytes", "frames",
              "bits", "load", "worst");
-  print_text("{:<16}{:>10}{:>8}{:>10}{:>11}\n", "", "/s", "of one", "/s", "/s");
+  print_text("{:<16}{:>10}{:>8}{:>10}{:>11}\n", "", "/s", "each", "/s", "/s");
   for (const BusTraffic& row : load.traffic) print_row(row);
   print_row(load.total);
   const std::uint32_t boards = most_boards(plan, nearly_full_bus);
@@ -117,9 +117,9 @@ void print_json(const BusPlan& plan, const BusLoad& load) {
 }
 
 std::string remedy(const BusPlan& plan) {
-  if (!plan.packed) return "leave out --plain, or fewer boards, fields or states";
-  if (plan.bit_rate.data == 0) return "fewer boards, fields or states, or CAN FD (--fd)";
-  return "fewer boards, fields or states, or a second bus";
+  if (!plan.packed) return "remove --plain, or use fewer boards, fields or states";
+  if (plan.bit_rate.data == 0) return "use fewer boards, fields or states, or CAN FD (--fd)";
+  return "use fewer boards, fields or states, or a second bus";
 }
 
 int live(const Options& options) {
@@ -136,7 +136,8 @@ int live(const Options& options) {
 int bus(const Options& options) {
   if (options.url) return live(options);
   if (options.duration) {
-    throw Error(ErrorKind::usage, "--duration", "is for a real bus", "name it, as in can://can0");
+    throw Error(ErrorKind::usage, "--duration", "needs the URL of a real bus",
+                "name the bus, as in can://can0");
   }
   const BusPlan plan = plan_of(options);
   const BusLoad load = load_of(plan);
@@ -150,7 +151,7 @@ int bus(const Options& options) {
     throw Error(ErrorKind::data, "the bus", "would need " + taken, remedy(plan));
   }
   if (load.total.load > nearly_full_bus) {
-    print_trouble("r4: warning: the bus: nearly full, {} is taken; {}", taken, remedy(plan));
+    print_trouble("r4: warning: the bus: nearly full, {} is used; {}", taken, remedy(plan));
   }
   return 0;
 }
@@ -158,23 +159,24 @@ int bus(const Options& options) {
 constexpr const char* footer = R"(Examples:
   r4 bus                        eight boards on a classic bus of 1 Mbit/s, in the packed form
   r4 bus --boards 2 --plain     two boards in plain text (pack=0)
-  r4 bus --plain --fd           eight in plain text on CAN FD
+  r4 bus --plain --fd           eight boards in plain text on CAN FD
   r4 bus --boards 3 --bitrate 500000 --rate 50 --fields DEFAULT,ENC1,ENC2
 
-  r4 bus can://can0             a real bus: what is on it, per id, by listening
+  r4 bus can://can0             a real bus: the traffic of each id; r4 only listens
 
-Of a plan: besides states and commands the link has 2 heartbeats a second from each board and 10 to it. What
-goes to a board is answered by a frame of flow control, which is counted with it.
+A plan also counts heartbeats: 2 a second from each board and 10 a second to each board. If a datagram to a
+board needs more than one frame, the board answers with a frame of flow control, which is counted too.
 
-load is the part of the bus's time that is taken: the frames of boards that drive, counted to the
-bit. worst is the longest values and the most stuff bits that there can be, all at once. A warning
-comes above 80 % of load: damaged frames are sent again, and what has a high id waits for longer.
+load is the part of the bus's time that the frames of driving boards use, counted to the bit. worst is the
+load if all values are longest and all frames have the most stuff bits. Above 80 % of load, r4 gives a
+warning, because damaged frames are repeated, and frames with a high id wait longer.
 
-Of a real bus: on a terminal the last second, redrawn until Ctrl-C; else, or with --duration, one table.
-Its bit rates are the controller's. Where that does not tell (slcan), and for a virtual bus, they are those of
---bitrate, else 1 Mbit/s, and, for CAN FD frames that switch, --dbitrate; if one is missing, that is told.
+For a real bus, r4 shows the last second on a terminal, until Ctrl-C. Otherwise, or with --duration, r4
+prints one table. The bit rates are those of the controller. If the controller does not report them (slcan),
+or the bus is virtual, r4 uses --bitrate (default 1 Mbit/s), and --dbitrate for CAN FD frames that switch
+the bit rate. If a needed option is missing, r4 gives a warning.
 
-Exit codes: 0 it fits; 1 it does not, more than 100 %; 2 an option is wrong; 4, 5, 6 the interface
+Exit codes: 0 the traffic fits; 1 the load is more than 100 %; 2 an option is wrong; 4, 5, 6 the interface
 cannot be opened.)";
 
 }  // namespace
@@ -185,19 +187,19 @@ void add_bus(CLI::App& root, Action& chosen) {
       root, chosen, "bus", "Show the load of a CAN bus, planned or real", footer, options, bus);
   add_text(
       *command, "URL", [options](const std::string& url) { options->url = url; },
-      "a real bus, such as can://can0; without: a plan", url_type, Need::optional);
+      "a real bus, such as can://can0 (default: a planned bus)", url_type, Need::optional);
   add_number(*command, "--boards", options->boards, 1, can_nodes, "boards on the bus (default 8)");
   add_number(*command, "--rate", options->rate, 1, 1000,
              "states a second of each board (default 100)");
   add_fields(*command, options->fields,
-             "state fields (default DEFAULT,SAFE,CMD, as our host asks; arming adds RELAYS)");
+             "state fields (default DEFAULT,SAFE,CMD, as r4 asks; arming adds RELAYS)");
   add_number(*command, "--commands", options->commands, 0, 1000,
              "commands a second to each board (default 20)");
   add_number(*command, "--bitrate", options->bit_rate, 10000, 1000000,
-             "bit/s, with --fd of the nominal phase (default 1000000)");
+             "bit rate in bit/s, with --fd of the nominal phase (default 1000000)");
   add_flag(*command, "--fd", options->fd, "CAN FD with frames of up to 64 bytes");
   add_number(*command, "--dbitrate", options->data_bit_rate, 10000, 8000000,
-             "bit/s of the data phase, with --fd (default 5000000)");
+             "bit rate of the data phase in bit/s, with --fd (default 5000000)");
   add_flag(*command, "--plain", options->plain, "plain text (pack=0) instead of the packed form");
   exclude(*command, "URL", {"--boards", "--rate", "--fields", "--commands", "--fd", "--plain"});
   add_duration(*command, options->duration, "how long to listen to a real bus");

@@ -32,7 +32,7 @@ std::string meaning_of_id(const CanSurvey& survey, std::uint32_t id) {
   const CanIdMeaning meaning = classify(id);
   if (!survey.is_r4(id)) {
     const bool is_ours = meaning.kind != CanIdKind::other;
-    return (is_ours ? "no R4 datagram: " : "not R4: ") + foreign_names(id);
+    return (is_ours ? "not an R4 datagram: " : "not R4: ") + foreign_names(id);
   }
   switch (meaning.kind) {
     case CanIdKind::emergency_stop:
@@ -46,7 +46,7 @@ std::string meaning_of_id(const CanSurvey& survey, std::uint32_t id) {
     case CanIdKind::telemetry:
       return fmt::format("states of board {}", meaning.node);
     case CanIdKind::watch:
-      return fmt::format("who watches board {}", meaning.node);
+      return fmt::format("watchers of board {}", meaning.node);
     case CanIdKind::other:
       break;
   }
@@ -110,7 +110,8 @@ class LiveBus {
     const Url url = Url::parse(text);
     const std::string& name = can_interface_of(url);
     if (text.find('?') != std::string::npos) {
-      throw Error(ErrorKind::usage, text, "all that is on a bus is counted, not a board",
+      throw Error(ErrorKind::usage, text,
+                  "r4 bus counts all frames on a bus, not those of one board",
                   fmt::format("write can://{}", name));
     }
     return can_interface(name);
@@ -120,14 +121,14 @@ class LiveBus {
     if (known != 0 && given && *given != known) {
       throw Error(ErrorKind::usage, fmt::format("{} {}", option, *given),
                   fmt::format("the controller of {} is set to {}", interface_.name, known),
-                  "leave the option out");
+                  "remove the option");
     }
     return known != 0 ? known : given.value_or(usual);
   }
   const CanBitRate& checked(const CanBitRate& rate) const {
     if (rate.data != 0 && !interface_.fd && interface_.exists) {
       throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", rate.data),
-                  interface_.name + " is not set up for CAN FD", "leave the option out");
+                  interface_.name + " is not set up for CAN FD", "remove the option");
     }
     if (rate.data != 0 && rate.data < rate.nominal) {
       throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", rate.data),
@@ -210,15 +211,15 @@ class LiveBus {
     if (!problem_.empty()) found.push_back(problem_);
     if (interface_.has_controller && interface_.bit_rate == 0 && !options_.bit_rate) {
       found.push_back(fmt::format(
-          "{}: the interface does not tell its bit rate, and is taken for one of {} kbit/s; add "
+          "{}: the interface does not report its bit rate, so {} kbit/s is assumed; add "
           "--bitrate",
           options_.url, rate_.nominal / 1000.0));
     }
     if (rate_.data == 0 && listener_.heard_rate_switch()) {
-      found.push_back(fmt::format(
-          "{}: CAN FD frames switch their bit rate, but are counted at {} kbit/s to their end; add "
-          "--dbitrate, the rate of their data phase",
-          options_.url, rate_.nominal / 1000.0));
+      found.push_back(
+          fmt::format("{}: CAN FD frames switch their bit rate, but all their bits are counted at "
+                      "{} kbit/s; add --dbitrate with the rate of the data phase",
+                      options_.url, rate_.nominal / 1000.0));
     }
     return found;
   }
@@ -226,8 +227,8 @@ class LiveBus {
   std::string fullness(const Window& window) const {
     const double load = window.load(window.total);
     return fmt::format(
-        "{}: {}, {:.1f} % of its time is taken; fewer boards, fields or states, or "
-        "pack=1 where it is 0",
+        "{}: {}, {:.1f} % of its time is used; use fewer boards, fields or states, or "
+        "pack=1 instead of pack=0",
         options_.url,
         load > 1 ? fmt::format("more than a bus of {} kbit/s carries", rate_.nominal / 1000.0)
                  : "nearly full",

@@ -20,9 +20,9 @@ Json time_json(const BusTransfers::Place& place) {
 const char* fix_of(CandumpError error) {
   switch (error) {
     case CandumpError::cut:
-      return "was candump killed while it wrote? Leave the line out";
+      return "remove the line: candump probably ended while it wrote the line";
     case CandumpError::dropped:
-      return "give it a larger buffer, candump -r 1000000, or fewer ids to record";
+      return "use a larger buffer, candump -r 1000000, or record fewer ids";
     default:
       return record_it;
   }
@@ -64,7 +64,7 @@ void BusLog::on_line(std::uint64_t number, std::string_view text) {
 }
 
 void BusLog::on_long_line(std::uint64_t number, std::uint64_t size) {
-  report_damage(number, "longer than a line of candump can be", record_it, {{"size", size}});
+  report_damage(number, "the line is too long for a line of candump", record_it, {{"size", size}});
 }
 
 void BusLog::report_damage(std::uint64_t number, const char* reason, const char* fix, Json rest) {
@@ -89,7 +89,8 @@ void BusLog::on_frame(const CandumpLine& line, const BusTransfers::Place& place)
       break;
     case BusTransfers::Frame::too_many_interfaces:
       report_damage(place.line, "more than 32 interfaces in one dump",
-                    "leave lines out: grep ' can0 '", {{"interface", std::string(line.interface)}});
+                    "select the lines of one interface: grep ' can0 '",
+                    {{"interface", std::string(line.interface)}});
   }
 }
 
@@ -108,7 +109,8 @@ void BusLog::on_raw_frame(const std::string& interface, const CanIdMeaning& mean
   object.update({{"node", meaning.node}, {"from", "board"}, {"ok", frame.size != 0}});
   if (frame.size == 0) {
     ++failed_;
-    object.update({{"error", "went_safe"}, {"reason", "the frame has no byte with the reason"}});
+    object.update(
+        {{"error", "went_safe"}, {"reason", "the byte with the reason is missing in the frame"}});
   } else {
     const SafeReason reason =
         frame.data[0] == 0 ? SafeReason::fault : to_safe_reason(frame.data[0]);

@@ -18,16 +18,16 @@ constexpr std::uint64_t max_seconds = 1'000'000'000'000;
 
 constexpr std::array texts{
     "none",
-    "a detail of the frame before",
+    "a detail of the previous frame",
     "candump has lost frames here",
     "not a line of candump",
-    "the time is none",
-    "not a name of an interface",
-    "no id of a frame",
-    "no frame has that many bytes",
+    "the time is not valid",
+    "the name of the interface is not valid",
+    "the id of the frame is not valid",
+    "the number of bytes is not valid for a frame",
     "the line is cut off",
     "a byte that is not two hexadecimal digits",
-    "something behind the frame",
+    "the line has text after the frame",
 };
 static_assert(texts.size() == static_cast<std::size_t>(CandumpError::rest) + 1);
 

@@ -65,15 +65,15 @@ class ReportFiles {
                                        : options.resume) {
     if (options.report.empty()) html_.replace_extension(".html");
     if (html_.extension() != ".html") {
-      throw Error(ErrorKind::usage, "--report " + options.report, "is not the name of a page",
-                  "end it with .html");
+      throw Error(ErrorKind::usage, "--report " + options.report, "is not the name of an HTML page",
+                  "end the name with .html");
     }
     json_ = html_;
     json_.replace_extension(".json");
     if (json_ != options.resume && has_report(json_)) {
-      throw Error(
-          ErrorKind::usage, json_.string(), "an earlier report is there",
-          "continue it with --resume " + json_.string() + ", or name another with --report");
+      throw Error(ErrorKind::usage, json_.string(), "already has an earlier report",
+                  "continue that report with --resume " + json_.string() +
+                      ", or name another file with --report");
     }
   }
 
@@ -102,7 +102,7 @@ class ReportFiles {
     if (!file || error) {
       throw Error(ErrorKind::open, path.string(),
                   error ? error.message() : std::string(std::strerror(errno)),
-                  "name a file in a folder that you may write: --report FILE.html");
+                  "name a file in a folder that you may write to: --report FILE.html");
     }
   }
 
@@ -145,8 +145,8 @@ int commission(const CommissionOptions& options) {
   const Report begun = begin(options);
   files.write(begun);  // before the checks, because the folder may not be writable
   if (!options.json && ::isatty(STDIN_FILENO) == 0) {
-    throw Error(ErrorKind::usage, "standard input", "is not a terminal, so nobody can hold a key",
-                "run it in a terminal; for a script there is --json");
+    throw Error(ErrorKind::usage, "standard input", "is not a terminal, so you cannot hold a key",
+                "run r4 commission in a terminal, or use --json in a script");
   }
 
   Board board(options.urls.front(), with_key(options.key));
@@ -177,20 +177,22 @@ int commission(const CommissionOptions& options) {
 }
 
 constexpr const char* commission_footer =
-    R"(Walks you through the board: first with the motor supply off (identity, settings, chips, supplies against
-a multimeter, handle, encoders, ultrasonic sensors, user buses, transports, relays, servos), then with the
-wheels off the ground (motor supply, motors, steppers, silence, stop). Further URLs lead to the same board.
+    R"(Guides you through the checks of a board. First keep the motor supply off (identity, settings, chips,
+supplies against a multimeter, handle, encoders, ultrasonic sensors, user buses, transports, relays,
+servos). Then lift the wheels off the ground (motor supply, motors, steppers, silence, stop). Further URLs
+must lead to the same board.
 
-Nothing moves before it was announced and you HOLD the space bar; letting go stops it. One output at a time
-moves, a motor at a tenth of full duty for half a second. Each step can be skipped (s), repeated (r) and left
-(q); --resume continues. At the end you are asked whether the board may keep the wiring and the settings
-that were learnt (over USB only).
+An output moves only after r4 has announced the movement, and only while you HOLD the space bar: release it
+to stop. Only one output moves at a time, and a motor runs at a tenth of full duty for half a second. You
+can skip (s) or repeat (r) each step, or leave (q); --resume continues. At the end, r4 asks whether the
+board may keep the wiring and the settings that r4 has found (over USB only).
 
-With --json questions and movements come as objects, a line each, and answers are read from standard input:
+With --json, r4 prints questions and movements as objects, one a line, and reads answers from standard
+input:
   {"type":"question","check":…,"topic":…,"text":…,"answer":"yes_no|number|choice","choices":[…]}
       answer with {"answer":true}, {"answer":12.1}, {"answer":"osmc 1"} or {"action":"skip|repeat|leave"}
   {"type":"movement","check":…,"text":…,"command":"O:410,0,1","milliseconds":500}
-      answer with {"key":true}; {"key":false} and the end of the input let go
+      answer with {"key":true}; {"key":false} or the end of the input releases the key
   {"type":"check","id":…,"status":"passed|found|skipped|not done|unsupported","measured":[…],"found":[…]}
 
 Examples:
@@ -199,8 +201,8 @@ Examples:
   r4 commission serial:auto --only 'osmc 1' --only 'encoder 1' --report motor.html
   r4 commission serial:auto --resume robot-7.json
 
-Exit codes: 0 nothing is wrong in what was checked; 1 the report has findings; 2 usage; 3 the link was lost;
-4, 5 the transport or the report cannot be opened.)";
+Exit codes: 0 the checks found nothing wrong; 1 the report has findings; 2 usage; 3 the link was lost; 4, 5
+the transport or the report cannot be opened.)";
 
 }  // namespace
 
@@ -209,14 +211,15 @@ void add_commission(CLI::App& root, Action& chosen) {
   CLI::App* const command =
       add_subcommand(root, chosen, "commission", "Check a new board, and learn how it is wired",
                      commission_footer, options, commission);
-  add_texts(*command, "URL", options->urls, "the board; then further transports to it", url_type);
-  add_repeated(*command, "--only", options->only, "do this check, even if it was done", "CHECK");
+  add_texts(*command, "URL", options->urls,
+            "the board; further URLs are other transports to the same board", url_type);
+  add_repeated(*command, "--only", options->only, "run this check, even if it is already done",
+               "CHECK");
   add_text(*command, "--report", options->report,
-           "write this page and, beside it, .json (default commissioning.html, or as --resume)",
+           "report page with its .json (default commissioning.html, or as --resume)", file_type);
+  add_text(*command, "--resume", options->resume, "continue an earlier report, FILE.json",
            file_type);
-  add_text(*command, "--resume", options->resume, "continue that earlier report, FILE.json",
-           file_type);
-  add_flag(*command, "--list", options->list, "list the checks, in their order");
+  add_flag(*command, "--list", options->list, "list the checks in their order");
   add_key(*command, options->key);
   add_json(*command, options->json, "ask and report in JSON, one object a line");
 }

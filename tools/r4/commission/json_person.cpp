@@ -54,7 +54,7 @@ std::optional<Answer> answer_in(const Json& line, const Question& question) {
 }
 
 void refuse(const Json& line, const std::string& expected) {
-  print_line(problem_json({ErrorKind::data, line_of(line), "this is not an answer", expected}));
+  print_line(problem_json({ErrorKind::data, line_of(line), "is not a valid answer", expected}));
 }
 
 }  // namespace
@@ -71,7 +71,7 @@ Json JsonPerson::next_line(std::chrono::milliseconds timeout) {
     Json line = Json::parse(line_, nullptr, false);
     line_.clear();
     if (line.is_object()) return line;
-    refuse(text_of(line_), "an object a line");
+    refuse(text_of(line_), "send one object a line");
   }
 }
 

@@ -64,7 +64,8 @@ std::string prompt_of(const Question& question) {
     case Question::Kind::yes_no:
       return "  y yes, n no, s skip, r repeat, q leave: ";
     case Question::Kind::number:
-      return fmt::format("  a number ({}) and Enter; s skip, r repeat, q leave: ", question.unit);
+      return fmt::format("  type a number ({}) and Enter; s skip, r repeat, q leave: ",
+                         question.unit);
     case Question::Kind::choice:
       break;
   }
@@ -72,7 +73,7 @@ std::string prompt_of(const Question& question) {
   for (std::size_t i = 0; i < question.choices.size(); ++i) {
     list += fmt::format("{}{} {}", i == 0 ? "  " : ", ", i + 1, question.choices[i]);
   }
-  return list + "\n  its number and Enter; s skip, r repeat, q leave: ";
+  return list + "\n  type the number and Enter; s skip, r repeat, q leave: ";
 }
 
 }  // namespace
@@ -100,7 +101,7 @@ Answer TerminalPerson::ask(const Question& question) {
     if (key == '\n' || key == '\r') {
       print_text("\n");
       if (const auto answer = read_line(question, line)) return *answer;
-      if (!line.empty()) print_text("  '{}' is not one of these: ", line);
+      if (!line.empty()) print_text("  '{}' is not a valid answer: ", line);
       line.clear();
     } else if (key == '\b' || key == 0x7F) {
       if (!line.empty()) line.pop_back();
@@ -117,7 +118,7 @@ Answer TerminalPerson::await_key(const commissioning::Movement& movement) {
   while (keyboard_.next(repeat_within) == ' ') {
   }
   keyboard_.forget();
-  print_text("{}\n  HOLD the space bar to begin, let go to end it; s skip, r repeat, q leave: ",
+  print_text("{}\n  HOLD the space bar to start, release it to stop; s skip, r repeat, q leave: ",
              movement.text);
   Clock::time_point pressed{};
   for (;;) {

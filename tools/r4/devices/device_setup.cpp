@@ -53,10 +53,10 @@ void DeviceSetup::look_for_resets() {
     if (is_set_up != false) continue;
     if (!progress.reset) {
       told_({ErrorKind::refused, devices_[i].text(),
-             "it is not set up, as after a reset: its values are not measurements",
+             "it is not set up, as after a reset, so its values are not measurements",
              in_control
-                 ? "it is set up again; look at its supply and wires if that repeats"
-                 : "the program that controls the board sets it up: give it this device, too",
+                 ? "check its supply and wires if this repeats; r4 now sets it up again"
+                 : "add this device to the program that controls the board, which then sets it up",
              Outcome::refused});
     }
     progress.reset = !in_control;  // after a new setup the next reset is reported
@@ -110,8 +110,8 @@ void DeviceSetup::tell(const CommandResult& result) {
   const Device& device = devices_[next_];
   const Problem problem =
       result.outcome == Outcome::not_armed
-          ? Problem{ErrorKind::refused, device.text(), "it is set up once the board is armed",
-                    "arm it: what sets a device up may move something, for all the board knows"}
+          ? Problem{ErrorKind::refused, device.text(), "it is not set up before the board is armed",
+                    "arm the board: setting up a device may move something"}
           : explain(device, result, board_.link());
   std::string text = problem.text();
   if (progress_[next_].told == text) return;

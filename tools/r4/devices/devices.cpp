@@ -53,13 +53,13 @@ void print_values(const DeviceDescription& device) {
   }
   for (const DeviceReady& each : device.ready) {
     const std::string& name = device.values[each.value].name;
-    print_text("  it is set up while {} is {}\n", name,
+    print_text("  the device is set up while {} is {}\n", name,
                each.number ? fmt::format("{}", *each.number) : "a measurement");
   }
   if (device.ready.empty() && !device.writes.empty()) {
     print_text(
-        "  after a reset its values are not told from measurements: add a line: ready VALUE "
-        "NUMBER\n");
+        "  after a reset its values look like measurements: to detect this, add a line: ready "
+        "VALUE NUMBER\n");
   }
 }
 
@@ -82,16 +82,16 @@ int devices(const Options& options) {
 }
 
 constexpr const char* footer =
-    R"(Without a name it lists the descriptions that are shipped; with one, or with the path of a file of your
-own, what that says: role, addresses, and its values with their units. A file that is wrong is told with
-its line. --device of r4 monitor and r4 convert takes such a name or path, with an address.
+    R"(Without NAME, r4 lists the descriptions that are installed with r4. With a name, or with the path of your
+own file, r4 shows the role, the addresses, and the values with their units. If a file is wrong, r4 reports
+the line. --device of r4 monitor and r4 convert takes such a name or path, with an address.
 
 Examples:
   r4 devices
   r4 devices bno055
-  r4 devices ./mine.device             is it right?
+  r4 devices ./mine.device             checks your own file
 
-Exit codes: 0 done; 1 the description is wrong; 2 no such device; 4, 5 the file cannot be read.)";
+Exit codes: 0 done; 1 the description is wrong; 2 the name is not known; 4, 5 the file cannot be read.)";
 
 }  // namespace
 
@@ -99,7 +99,7 @@ void add_devices(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(root, chosen, "devices", "List the described sensors",
                                            footer, options, devices);
-  add_text(*command, "NAME", options->device, "one of them, or a file", file_type);
+  add_text(*command, "NAME", options->device, "the name of a description, or a file", file_type);
   add_json(*command, options->json, "print JSON, one object a line");
 }
 

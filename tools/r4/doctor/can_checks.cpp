@@ -29,7 +29,7 @@ Finding down(const Machine& machine, const CanInterface& interface) {
     finding.mending = Mending::automatic;
   } else if (interface.bit_rate == 0) {
     finding.reason +=
-        ", and has no bit rate; 1000000 is what boards have where nobody has changed it";
+        ", and has no bit rate; the bit rate of a board is 1000000 unless you have changed it";
     finding.fix =
         machine.as_root(fmt::format("ip link set {} up txqueuelen 1000 type can bitrate 1000000 "
                                     "sample-point 0.875 restart-ms 100",
@@ -46,9 +46,8 @@ Finding down(const Machine& machine, const CanInterface& interface) {
 Finding bus_off(const Machine& machine, const CanInterface& interface) {
   Finding finding = about(interface, Severity::error, "can.busoff");
   finding.reason =
-      "bus-off: the controller has given up, because no node acknowledges its frames or the bit "
-      "rates "
-      "differ";
+      "bus-off: the controller has stopped, because no node acknowledges its frames or the bit "
+      "rates differ";
   finding.fix = machine.as_root(fmt::format("ip link set {} type can restart", interface.name));
   finding.mending = Mending::automatic;
   return finding;
@@ -62,8 +61,8 @@ void check_controller(const Machine& machine, const CanInterface& interface, Fin
        interface.state == "error-warning")) {
     Finding finding = about(interface, Severity::warning, "can.errors");
     finding.reason = fmt::format(
-        "{}, error counters tx {} rx {}: look for wiring, termination, another bit rate, or nobody "
-        "else on the bus",
+        "{}, error counters tx {} rx {}: the wiring, the termination or a bit rate is wrong, or "
+        "the bus has no other node",
         interface.state, interface.tx_errors, interface.rx_errors);
     finding.fix = fmt::format("candump -e {},0:0,#FFFFFFFF", interface.name);
     findings.push_back(finding);
@@ -71,7 +70,7 @@ void check_controller(const Machine& machine, const CanInterface& interface, Fin
   // The kernel's slcan driver reports no bit rate and cannot restart.
   if (interface.restart_ms == 0 && interface.bit_rate != 0) {
     Finding finding = about(interface, Severity::warning, "can.restart");
-    finding.reason = "restart-ms is 0: a bus-off lasts until somebody restarts the controller";
+    finding.reason = "restart-ms is 0: a bus-off lasts until you restart the controller";
     finding.fix = machine.as_root(fmt::format(
         "ip link set {0} down && ip link set {0} up type can restart-ms 100", interface.name));
     findings.push_back(finding);
@@ -81,7 +80,7 @@ void check_controller(const Machine& machine, const CanInterface& interface, Fin
 }  // namespace
 
 Findings check_can_kernel(const Machine& machine) {
-  Finding finding{Severity::ok, "can.kernel", "SocketCAN",           "is there",
+  Finding finding{Severity::ok, "can.kernel", "SocketCAN",           "is available",
                   "",           {},           ErrorKind::unsupported};
   if (machine.exists("/proc/net/can")) return {finding};
   finding.severity = Severity::note;
@@ -91,7 +90,7 @@ Findings check_can_kernel(const Machine& machine) {
     finding.fix = machine.as_root("modprobe can-raw");
     finding.mending = Mending::automatic;
   } else {
-    finding.reason = "this kernel has none";
+    finding.reason = "this kernel does not support CAN";
     finding.fix = "tools/with-can r4 list";
   }
   return {finding};
@@ -100,7 +99,8 @@ Findings check_can_kernel(const Machine& machine) {
 Findings check_can_interface(const Machine& machine, const CanInterface& interface) {
   if (!interface.exists) {
     Finding finding = about(interface, Severity::error, "can.missing");
-    finding.reason = "there is no such interface: plug its adapter in, or make a virtual one";
+    finding.reason =
+        "the interface does not exist: plug its adapter in, or create a virtual interface";
     finding.fix = machine.as_root(fmt::format("ip link add {} type vcan", interface.name));
     finding.kind = ErrorKind::unsupported;
     return {finding};
@@ -117,8 +117,8 @@ Findings check_can_interface(const Machine& machine, const CanInterface& interfa
   if (interface.has_controller) check_controller(machine, interface, findings);
   if (interface.has_controller && interface.tx_queue < least_queue) {
     Finding finding = about(interface, Severity::warning, "can.queue");
-    finding.reason = fmt::format("txqueuelen is {}: programs lose frames that they send at once",
-                                 interface.tx_queue);
+    finding.reason = fmt::format(
+        "txqueuelen is {}: programs that send many frames at once lose frames", interface.tx_queue);
     finding.fix = machine.as_root(fmt::format("ip link set {} txqueuelen 1000", interface.name));
     finding.mending = Mending::automatic;
     findings.push_back(finding);
@@ -144,7 +144,7 @@ Findings check_foreign_frames(const CanSurvey& survey, const std::string& interf
     Finding finding{Severity::warning, "can.foreign",  interface, "", "",
                     Mending::by_hand,  ErrorKind::data};
     finding.reason =
-        fmt::format("{} frames with id {:03X}, which is one of board {}, make no R4 datagram: {}",
+        fmt::format("{} frames with id {:03X}, an id of board {}, are not R4 datagrams: {}",
                     traffic.frames, id, node, foreign_names(id));
     finding.fix = fmt::format("r4 bus can://{}", interface);
     findings.push_back(finding);
@@ -156,7 +156,7 @@ Findings check_can_load(const std::string& interface, double load) {
   Finding finding{Severity::ok,
                   "can.load",
                   interface,
-                  fmt::format("the bus is taken for {:.1f} % of the time", 100 * load),
+                  fmt::format("the bus is busy for {:.1f} % of the time", 100 * load),
                   "",
                   {},
                   ErrorKind::data};

@@ -164,7 +164,7 @@ int mend(const Findings& findings, bool json) {
       print_line(
           {{"type", "mended"}, {"check", each.check}, {"command", each.fix}, {"done", worked}});
     } else if (!worked) {
-      print_text("it failed\n");
+      print_text("the command failed\n");
     }
     mended += worked ? 1 : 0;
   }
@@ -248,13 +248,13 @@ int doctor(const Options& given) {
 }
 
 constexpr const char* footer =
-    R"(Without a URL it looks at what this machine has: serial ports and who may open them, rules of udev,
-ModemManager, CAN interfaces, network, clock, processors. It asks boards at USB ports for their identity
-(Q:ID), as r4 list does. With URLs it looks at what these need, and then listens to each board for 5 s, as
-one that watches: it commands nothing.
+    R"(Without a URL, r4 checks this machine: serial ports and their permissions, udev rules, ModemManager, CAN
+interfaces, network, clock and processors. Like r4 list, it asks boards at USB ports for their identity
+(Q:ID). With URLs, r4 checks only what their transports need. Then it listens to each board for 5 s as a
+watcher, and sends no commands.
 
-Below each finding is the command that mends it. --fix runs those that need no choice, each shown
-before, and looks again. It kills no program, sets no bit rate and takes no interface down.
+The line below a finding shows the command that fixes it. --fix shows and runs the commands that need no
+choice, and checks again. It does not kill programs, set bit rates or take interfaces down.
 
 Examples:
   r4 doctor
@@ -263,21 +263,22 @@ Examples:
   r4 doctor --fix
   r4 doctor --udev-rules | sudo tee /etc/udev/rules.d/70-r4.rules
 
-Exit codes: 0 nothing is wrong; 1 there are warnings; 2 usage; else that of the first error: 3 a board
-says nothing, or too much is lost; 4, 5 a transport cannot be opened; 6 an interface is missing.)";
+Exit codes: 0 nothing is wrong; 1 there are warnings; 2 usage; or the code of the first error: 3 a board
+is silent, or the loss is too high; 4, 5 a transport cannot be opened; 6 an interface is missing.)";
 
 }  // namespace
 
 void add_doctor(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(
-      root, chosen, "doctor", "Find what is wrong with this machine or a link, and how to mend it",
+      root, chosen, "doctor", "Find faults of this machine or of a link, and how to fix them",
       footer, options, doctor);
   add_texts(*command, "URL", options->urls, "where boards are, such as serial:auto", url_type);
   add_duration(*command, options->duration, "how long to listen to each link (default 5)");
-  add_flag(*command, "--fix", options->fix, "run what needs no choice, and look again");
+  add_flag(*command, "--fix", options->fix,
+           "run the commands that need no choice, and check again");
   add_flag(*command, "--udev-rules", options->udev_rules,
-           "print the rules for udev and do nothing else");
+           "print the udev rules, without any check");
   add_json(*command, options->json, "print JSON, one object a line");
 }
 

@@ -153,42 +153,42 @@ Findings judge_link(const std::string& url, const LinkSample& sample) {
   if (sample.damaged > 0) {
     findings.push_back(found(
         url, Severity::warning, "link.damaged",
-        fmt::format(
-            "{} datagrams came damaged: wiring, another baud rate, or somebody else reads the port",
-            sample.damaged),
+        fmt::format("{} datagrams were damaged: the wiring or the baud rate is wrong, or another "
+                    "program reads the port",
+                    sample.damaged),
         fmt::format("r4 monitor {} --json", url)));
   }
   if (loss >= some_loss) {
     const bool much = loss >= much_loss;
-    findings.push_back(
-        found(url, much ? Severity::error : Severity::warning, "link.loss",
-              fmt::format("{} of {:.0f} datagrams are lost, {:.1f} %{}", sample.lost, all,
-                          100 * loss, much ? ": heartbeats are, too, and the board goes safe" : ""),
-              fmt::format("r4 bench {}", url), ErrorKind::refused));
+    findings.push_back(found(
+        url, much ? Severity::error : Severity::warning, "link.loss",
+        fmt::format("{} of {:.0f} datagrams are lost, {:.1f} %{}", sample.lost, all, 100 * loss,
+                    much ? ": heartbeats are also lost, so the board goes safe" : ""),
+        fmt::format("r4 bench {}", url), ErrorKind::refused));
   }
   if (sample.jitter_us > much_jitter_us) {
     findings.push_back(found(
         url, Severity::warning, "link.jitter",
-        fmt::format("states come {:.1f} ms early or late on average", sample.jitter_us / 1000),
+        fmt::format("states arrive {:.1f} ms early or late on average", sample.jitter_us / 1000),
         fmt::format("r4 bench {}", url)));
   }
   if (sample.states == 0) {
     findings.push_back(
         found(url, Severity::error, "link.states",
-              fmt::format("{} datagrams came in {:.1f} s, and none is a state: {}", sample.received,
+              fmt::format("{} datagrams arrived in {:.1f} s, but no state: {}", sample.received,
                           sample.seconds, sample.link.reason),
               sample.link.fix.empty() ? fmt::format("r4 monitor {} --json", url) : sample.link.fix,
               ErrorKind::refused));
   }
   if (sample.answered == Answered::no) {
     const bool known = sample.trouble != TransportTrouble::none;
-    findings.push_back(
-        found(url, Severity::error, "link.answer",
-              known ? sample.link.reason
-                    : "the board does not answer a question: it does not hear this computer",
-              known ? sample.link.fix
-                    : "look at the way to the board (its RX wire, firewall): r4 bench " + url,
-              ErrorKind::refused));
+    findings.push_back(found(
+        url, Severity::error, "link.answer",
+        known ? sample.link.reason
+              : "the board does not answer: it does not receive datagrams from this computer",
+        known ? sample.link.fix
+              : "check the connection to the board (its RX wire, a firewall): r4 bench " + url,
+        ErrorKind::refused));
   } else if (sample.answer_us > slow_answer_us) {
     findings.push_back(found(url, Severity::warning, "link.answer",
                              fmt::format("the board answers after {:.0f} ms, and refuses commands "
@@ -198,12 +198,11 @@ Findings judge_link(const std::string& url, const LinkSample& sample) {
   }
   if (findings.empty()) {
     const bool answered = sample.answered == Answered::yes;
-    std::string answer =
-        answered ? "it answers" : "it was not asked whether it hears this computer";
+    std::string answer = answered ? "the board answers" : "the board was not asked for an answer";
     if (sample.answer_us > 0) answer += fmt::format(" in {:.1f} ms", sample.answer_us / 1000);
     findings.push_back(found(
         url, answered ? Severity::ok : Severity::note, "link",
-        fmt::format("{} states in {:.1f} s, {} lost, none damaged, jitter "
+        fmt::format("{} states in {:.1f} s, {} lost, 0 damaged, jitter "
                     "{:.1f} ms; {}",
                     sample.states, sample.seconds, sample.lost, sample.jitter_us / 1000, answer),
         ""));

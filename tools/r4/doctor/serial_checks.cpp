@@ -146,7 +146,7 @@ Findings check_port_permission(const Machine& machine, const std::string& path) 
   struct stat file {};
   if (::stat((machine.root + path).c_str(), &file) != 0) {
     finding.severity = Severity::error;
-    finding.reason = "there is no such port";
+    finding.reason = "the port does not exist";
     finding.fix = "r4 list";
     return {finding};
   }
@@ -156,13 +156,13 @@ Findings check_port_permission(const Machine& machine, const std::string& path) 
   const std::optional<Group> group = group_of(machine, dialout);
   const std::string& user = machine.user.name;
   if (!group || group->id != file.st_gid || (file.st_mode & 060) != 060) {
-    finding.reason =
-        fmt::format("permission denied for {}, and it is not the group {}'s either", user, dialout);
+    finding.reason = fmt::format(
+        "permission denied for {}: the group {} may not read and write the port", user, dialout);
     finding.fix = machine.as_root(fmt::format("chgrp {0} {1} && chmod g+rw {1}", dialout, path));
   } else if (std::find(group->members.begin(), group->members.end(), user) !=
              group->members.end()) {
-    finding.reason =
-        fmt::format("permission denied: {} is in the group {} since the last login", user, dialout);
+    finding.reason = fmt::format(
+        "permission denied: {} was added to the group {} after the last login", user, dialout);
     finding.fix = fmt::format("newgrp {}", dialout);
   } else {
     finding.reason = fmt::format("permission denied: {} is not in the group {}", user, dialout);
@@ -175,13 +175,14 @@ Findings check_port_permission(const Machine& machine, const std::string& path) 
 Findings check_port_holders(const Machine& machine, const std::string& path, pid_t sharing) {
   Findings findings;
   if (sharing != 0) {
-    findings.push_back({Severity::ok,
-                        "serial.holder",
-                        path,
-                        fmt::format("a program of r4 (pid {}) has it open, and shares it", sharing),
-                        "",
-                        {},
-                        ErrorKind::data});
+    findings.push_back(
+        {Severity::ok,
+         "serial.holder",
+         path,
+         fmt::format("an r4 program (pid {}) has the port open, and shares the port", sharing),
+         "",
+         {},
+         ErrorKind::data});
   }
   for (const std::string& pid : processes(machine)) {
     if (pid == fmt::format("{}", ::getpid()) || pid == fmt::format("{}", sharing)) continue;
@@ -191,7 +192,8 @@ Findings check_port_holders(const Machine& machine, const std::string& path, pid
       const std::string program = machine.read("/proc/" + pid + "/comm").value_or("a program");
       findings.push_back(
           {Severity::warning, "serial.holder", path,
-           fmt::format("{} (pid {}) has it open and reads what the board says", program, pid),
+           fmt::format("{} (pid {}) has the port open and reads datagrams of the board", program,
+                       pid),
            "kill " + pid, Mending::by_hand, ErrorKind::open});
       break;
     }
@@ -206,7 +208,7 @@ Findings check_latency_timer(const Machine& machine, const std::string& path) {
   Finding finding{Severity::ok,
                   "serial.latency",
                   path,
-                  fmt::format("the adapter keeps bytes for {} ms", *ms),
+                  fmt::format("the adapter may delay bytes by {} ms", *ms),
                   "",
                   {},
                   ErrorKind::data};
@@ -225,10 +227,9 @@ Findings check_udev_rules(const Machine& machine, std::string_view rules) {
   const bool modems = is_running(machine, "ModemManager");
   const bool keeps_off = installed && installed->find("ID_MM_DEVICE_IGNORE") != std::string::npos;
   finding.severity = Severity::warning;
-  finding.reason = installed
-                       ? "the rules for udev are those of another version of r4"
-                       : "the rules for udev are missing, which let you open a board and keep "
-                         "programs from taking it for a modem";
+  finding.reason = installed ? "the udev rules are those of another version of r4"
+                             : "the udev rules are missing: they let you open a board, and prevent "
+                               "programs from using the board as a modem";
   finding.fix =
       fmt::format("r4 doctor --udev-rules | {}",
                   machine.as_root(fmt::format(
@@ -240,7 +241,7 @@ Findings check_udev_rules(const Machine& machine, std::string_view rules) {
   if (modems && !keeps_off) {
     finding.check = "serial.modemmanager";
     finding.thing = "ModemManager";
-    finding.reason = "runs, and sends modem commands to each serial port that comes";
+    finding.reason = "is running, and sends modem commands to each new serial port";
     findings.push_back(finding);
   }
   return findings;
@@ -271,8 +272,8 @@ Findings check_brltty(const Machine& machine, const std::vector<std::string>& po
     if (chips.empty()) continue;
     findings.push_back(
         {concerned ? Severity::warning : Severity::note, "serial.brltty", name,
-         fmt::format("brltty takes adapters with a {} for braille displays: their port vanishes "
-                     "a second after it was plugged in",
+         fmt::format("brltty uses adapters with a {} as braille displays: their port disappears "
+                     "a second after you plug the adapter in",
                      chips),
          machine.as_root(fmt::format("ln -s /dev/null /etc/udev/rules.d/{} && udevadm control "
                                      "--reload",

@@ -33,7 +33,7 @@ void check_receive_buffer(const Machine& machine, Findings& findings) {
   if (bytes >= least_receive_buffer) return;
   findings.push_back(found(
       Severity::warning, "network.buffer", "net.core.rmem_max",
-      fmt::format("{} bytes: datagrams that arrive while a program stands still are lost", bytes),
+      fmt::format("{} bytes: datagrams that arrive while a program is paused are lost", bytes),
       machine.as_root(fmt::format("sysctl -w net.core.rmem_max={}", least_receive_buffer)),
       Mending::automatic));
 }
@@ -43,10 +43,10 @@ void check_power_saving(const Machine& machine, Findings& findings) {
     if (!machine.exists("/sys/class/net/" + name + "/phy80211")) continue;
     const std::string says = machine.run(fmt::format("iw dev {} get power_save", name));
     if (says.find(": on") == std::string::npos) continue;
-    findings.push_back(found(
-        Severity::warning, "network.powersave", name,
-        "power saving of WiFi is on: datagrams wait for up to a few hundred ms",
-        machine.as_root(fmt::format("iw dev {} set power_save off", name)), Mending::automatic));
+    findings.push_back(found(Severity::warning, "network.powersave", name,
+                             "power saving of WiFi is on: datagrams wait up to a few hundred ms",
+                             machine.as_root(fmt::format("iw dev {} set power_save off", name)),
+                             Mending::automatic));
   }
 }
 
@@ -71,7 +71,7 @@ void check_firewall(const Machine& machine, Findings& findings) {
   if (!there) return;
   if (!machine.user.is_root()) {
     findings.push_back(found(Severity::note, "network.firewall", "firewall",
-                             "only root may read its rules", "sudo r4 doctor"));
+                             "only root can read the rules", "sudo r4 doctor"));
     return;
   }
   const std::string nft = machine.run("nft list ruleset");
@@ -83,19 +83,20 @@ void check_firewall(const Machine& machine, Findings& findings) {
   if (nft_drops && !lets_in(nft)) {
     findings.push_back(found(
         Severity::warning, "network.firewall", "nft",
-        "drops what comes from boards: no rule names UDP port 2018 or 2390",
+        "drops datagrams from boards: no rule names UDP port 2018 or 2390",
         fmt::format("nft insert rule {} {} udp sport {} accept", last_named(nft, "table ", hook),
                     last_named(nft, "chain ", hook), board_port)));
   } else if (iptables_drops && !lets_in(iptables)) {
     findings.push_back(
         found(Severity::warning, "network.firewall", "iptables",
-              "drops what comes from boards: no rule names UDP port 2018 or 2390",
+              "drops datagrams from boards: no rule names UDP port 2018 or 2390",
               fmt::format("iptables -I INPUT -p udp --sport {} -j ACCEPT", board_port)));
   } else if (iptables.empty() && machine.run("nft --version").empty()) {
     findings.push_back(found(Severity::note, "network.firewall", "firewall",
-                             "neither nft nor iptables tells its rules", "apt install nftables"));
+                             "nft and iptables do not show their rules", "apt install nftables"));
   } else {
-    findings.push_back(found(Severity::ok, "network.firewall", "firewall", "lets boards in"));
+    findings.push_back(
+        found(Severity::ok, "network.firewall", "firewall", "accepts datagrams from boards"));
   }
 }
 
@@ -115,19 +116,21 @@ bool clock_is_synchronized() {
 }
 
 Findings check_clock(bool synchronized) {
-  if (synchronized) return {found(Severity::ok, "clock", "wall clock", "is kept by NTP or PTP")};
+  if (synchronized)
+    return {found(Severity::ok, "clock", "wall clock", "is synchronized by NTP or PTP")};
   return {found(Severity::note, "clock", "wall clock",
-                "nothing keeps it: times in recordings of several computers do not fit together",
+                "is not synchronized: times in recordings of different computers do not match",
                 "timedatectl set-ntp true")};
 }
 
 Findings check_clock_steps(double seconds) {
   if (std::abs(seconds) < noticeable_step_s) return {};
-  return {found(Severity::warning, "clock.step", "wall clock",
-                fmt::format("was set by {:+.3f} s meanwhile: links go on, logs of several "
-                            "computers do not fit together",
-                            seconds),
-                "timedatectl timesync-status")};
+  return {
+      found(Severity::warning, "clock.step", "wall clock",
+            fmt::format("was changed by {:+.3f} s during the check: links continue, but logs of "
+                        "different computers do not match",
+                        seconds),
+            "timedatectl timesync-status")};
 }
 
 Findings check_processors(const Machine& machine) {
@@ -149,7 +152,7 @@ Findings check_processors(const Machine& machine) {
   if (!slow.empty()) {
     findings.push_back(
         found(Severity::warning, "processor.governor", slow,
-              "powersave: it keeps the lowest frequency, whatever has to be done",
+              "powersave: the processor keeps its lowest frequency at any load",
               machine.as_root(
                   "echo performance | tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor")));
   }
@@ -158,8 +161,8 @@ Findings check_processors(const Machine& machine) {
   if (processors > 0 && load > 1.5 * static_cast<double>(processors)) {
     findings.push_back(
         found(Severity::warning, "processor.load", "processors",
-              fmt::format("{:.1f} programs want {} processors: what a link waits for comes late",
-                          load, processors),
+              fmt::format("{:.1f} programs compete for {} processors, so links are delayed", load,
+                          processors),
               "top"));
   }
   if (findings.empty() && processors > 0 && loads) {

@@ -61,8 +61,8 @@ int run_dfu_util(std::vector<const char*> arguments,
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) {
     throw Error(ErrorKind::unsupported, "dfu-util",
-                "it cannot be started, and it writes the sketch",
-                "as root: apt-get install dfu-util");
+                "cannot be started, but r4 needs it to write the sketch",
+                "install it as root: apt-get install dfu-util");
   }
   ::close(pipe.ends[1]);
   pipe.ends[1] = -1;
@@ -108,7 +108,7 @@ class Progress {
 
 std::string last_line(std::string_view text) {
   const auto end = text.find_last_not_of("\r\n \t");
-  if (end == std::string_view::npos) return "it printed nothing";
+  if (end == std::string_view::npos) return "failed without a message";
   text = text.substr(0, end + 1);
   const auto begin = text.find_last_of("\r\n");
   if (begin != std::string_view::npos) text.remove_prefix(begin + 1);
@@ -155,7 +155,7 @@ void write_by_dfu(const std::string& path, const std::string& usb_path,
   const bool written = end.find("File downloaded successfully") != std::string::npos;
   if (code != 0 && !written) {
     throw Error(ErrorKind::open, "dfu-util", last_line(end),
-                "press the board's reset button twice, so that its boot loader waits, and repeat");
+                "press the board's reset button twice to start its boot loader, and try again");
   }
 }
 

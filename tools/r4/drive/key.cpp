@@ -28,7 +28,8 @@ struct KeyOptions {
 
 int make(const KeyOptions& options) {
   if (!options.url.empty()) {
-    throw Error(ErrorKind::usage, options.url, "a new key needs no board", "r4 key new FILE");
+    throw Error(ErrorKind::usage, options.url, "is not needed for a new key",
+                "remove the URL: r4 key new FILE");
   }
   const auto id = static_cast<std::uint8_t>(options.id.value_or(1));
   make_key_file(options.file, id);
@@ -42,11 +43,12 @@ int make(const KeyOptions& options) {
 
 int give(const KeyOptions& options) {
   if (options.url.empty()) {
-    throw Error(ErrorKind::usage, "URL", "is missing", "r4 key give FILE serial:auto");
+    throw Error(ErrorKind::usage, "URL", "is missing",
+                "name the board: r4 key give FILE serial:auto");
   }
   if (options.id) {
     throw Error(ErrorKind::usage, fmt::format("--id {}", *options.id),
-                "a key has its id since it was made", "r4 key new FILE --id N");
+                "cannot change the id of a key", "make a new key: r4 key new FILE --id N");
   }
   require_cable(options.url, "the key in " + options.file);
   const Key key = load_key(options.file);
@@ -56,8 +58,8 @@ int give(const KeyOptions& options) {
   // A board in the safe state also accepts a key.
   board.setting("key", {text.data(), text.size()}, std::chrono::seconds{5});
   print_text(
-      "the board has key {}. From networks and buses it obeys only hosts with this key, and every "
-      "stop\n",
+      "the board has key {}. From networks and buses, it obeys only hosts with this key. It obeys "
+      "a stop from any host\n",
       key.id);
   return 0;
 }
@@ -65,7 +67,8 @@ int give(const KeyOptions& options) {
 int keys(const KeyOptions& options) {
   if (options.file.empty() || is_url(options.file)) {
     throw Error(ErrorKind::usage, fmt::format("'{}'", options.file), "is not a file",
-                options.action == "new" ? "r4 key new FILE" : "r4 key give FILE serial:auto");
+                options.action == "new" ? "name a file: r4 key new FILE"
+                                        : "name a file: r4 key give FILE serial:auto");
   }
   return options.action == "new" ? make(options) : give(options);
 }
@@ -75,16 +78,16 @@ constexpr const char* key_footer =
 environment, r4 signs its heartbeats and commands. An emergency stop needs no key. A host at the
 board's USB cable needs no key, and can set one.
 
-A key has an id, 1 to 9; a board holds up to four. Give each host its own, so that one can be
-taken away: r4 send serial:auto C:key,2:off
+A key has an id, 1 to 9. A board holds up to four keys. Give each host its own key, so that you
+can remove one key: r4 send serial:auto C:key,2:off
 
 Examples:
-  r4 key new ~/.r4-key                  makes it, readable by you alone
-  r4 key give ~/.r4-key serial:auto     the board has it, and from now on asks for it
+  r4 key new ~/.r4-key                  makes a key in a file that only you can read
+  r4 key give ~/.r4-key serial:auto     sets the key on the board, which then requires the key
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --key ~/.r4-key
 
-Exit codes: 0 done; 1 the file holds no key; 2 usage, also a URL that is not a cable; 3 the board did not
-take it; 4, 5 the file or the transport cannot be opened.)";
+Exit codes: 0 done; 1 the file does not contain a key; 2 usage, or the URL is not a cable; 3 the board did
+not accept the key; 4, 5 the file or the transport cannot be opened.)";
 
 }  // namespace
 
@@ -96,7 +99,7 @@ void add_key_command(CLI::App& root, Action& chosen) {
       *command, "ACTION",
       [options](const std::string& action) {
         if (action != "new" && action != "give") {
-          throw Error(ErrorKind::usage, action, "is nothing to be done with a key",
+          throw Error(ErrorKind::usage, action, "is not a valid action: expected new or give",
                       "use new or give");
         }
         options->action = action;
@@ -105,7 +108,7 @@ void add_key_command(CLI::App& root, Action& chosen) {
   add_text(*command, "FILE", options->file, "the file with the key", file_type, Need::required);
   add_text(*command, "URL", options->url, "give: where the board is, such as serial:auto",
            url_type);
-  add_number(*command, "--id", options->id, 1, max_key_id, "new: its id (default 1)");
+  add_number(*command, "--id", options->id, 1, max_key_id, "new: the id of the key (default 1)");
 }
 
 }  // namespace r4::tool

@@ -57,7 +57,7 @@ bool is(CommandKind kind, const Order& order) {
 Order order_of(const std::string& text, const std::string& url) {
   Order order = parse_text(text);
   if (is(CommandKind::heartbeat, order)) {
-    throw Error(ErrorKind::usage, text, "heartbeats are sent by themselves",
+    throw Error(ErrorKind::usage, text, "r4 sends heartbeats itself",
                 "use --hold to keep the link up");
   }
   if (const auto command = command_of(order)) require_cable(url, *command);
@@ -191,7 +191,7 @@ class Sender {
       print_line(result_json(text, result, problem, confirmed));
     } else if (confirmed) {
       print_text("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
-                 next_ == 0 ? ", connecting included" : "");
+                 next_ == 0 ? ", including connection setup" : "");
       if (is(CommandKind::identify, orders_[next_])) print_identity();
       if (is_transfer()) print_bytes(result.transfer);
     } else {
@@ -210,8 +210,8 @@ class Sender {
     }
     if (supply_is_missing() && !options_.json) {
       print_trouble(
-          "r4: {}: the motor supply is open (relay 1 is off), so no motor turns; send R:1,On "
-          "before it",
+          "r4: {}: the motor supply is open (relay 1 is off), so the motors do not turn; send "
+          "R:1,On first",
           text);
     }
     next_ += size;
@@ -235,7 +235,7 @@ class Sender {
     if (!is(CommandKind::i2c_scan, orders_[next_])) {
       if (data.size != 0) print_text("  x{:02x}\n", fmt::join(data.begin(), data.end(), ""));
     } else if (data.size == 0) {
-      print_text("  nobody answers\n");
+      print_text("  no device answers\n");
     } else {
       print_text("  0x{:02x}\n", fmt::join(data.begin(), data.end(), " 0x"));
     }
@@ -307,27 +307,28 @@ int send(const SendOptions& given) {
 }
 
 constexpr const char* send_footer =
-    R"(Each command is sent when the board's own state has confirmed the one before it; the first that is not
-confirmed ends the run. All are checked before the first is sent. Several in one argument, separated by
-semicolons, are a group: up to 16 of O D S R P B Z and X:DAC that the board executes together, or none of
-them.
+    R"(r4 checks all commands before it sends the first command. Each further command is sent after the board's own
+state has confirmed the previous command. If a command is not confirmed, r4 ends. Commands in one argument,
+separated by semicolons, are a group: up to 16 commands O D S R P B Z and X:DAC. The board executes a
+group completely or not at all.
 
-The board goes safe, its outputs off, as soon as this program ends: --hold keeps them on. No motor turns while
-relay 1, the motor supply, is open: it is at first and after each safe state, and R:1,On closes it.
+When r4 ends, the board goes safe and switches its outputs off: --hold keeps them on. The motors turn only
+while relay 1, the motor supply, is closed. It is open at the start and after each safe state, and R:1,On
+closes it.
 
 Examples:
-  r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply
+  r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On closes the motor supply
   r4 send serial:auto R:1,On D:1000,1,1 S:1500,3 R:2,On --hold 60
   r4 send serial:auto R:1,On 'O:358,1,1;O:358,1,2' --hold 5  both wheels at once
-  r4 send serial:auto udp://192.168.0.125 S:1500,3 --hold 60  two paths: either may be pulled
+  r4 send serial:auto udp://192.168.0.125 S:1500,3 --hold 60  two paths: one may fail
   r4 send serial:auto E:CLEAR                 after an emergency stop
-  r4 send serial:auto C:timeout,300 C:heartbeat,100     side by side: one step, in any order
-  r4 send udp://127.0.0.1 Q:ID                who is it?
-  r4 send serial:auto X:SCAN                  which devices answer on the user's I2C bus?
-  r4 send serial:auto X:READ,0x68,x75,1       register 0x75 of the one at 0x68
+  r4 send serial:auto C:timeout,300 C:heartbeat,100     next to each other: one step, in any order
+  r4 send udp://127.0.0.1 Q:ID                the identity of the board
+  r4 send serial:auto X:SCAN                  the devices that answer on the user's I2C bus
+  r4 send serial:auto X:READ,0x68,x75,1       register 0x75 of the device at 0x68
 
-Exit codes: 0 all confirmed; 3 one was refused or not confirmed in time; 2 a command or option is
-wrong, nothing was sent; 4 the transport cannot be opened; 5 permission denied.)";
+Exit codes: 0 all commands were confirmed; 3 a command was refused or not confirmed in time; 2 a command or
+option is wrong, and nothing was sent; 4 the transport cannot be opened; 5 permission denied.)";
 
 }  // namespace
 
@@ -341,8 +342,8 @@ void add_send(CLI::App& root, Action& chosen) {
             "commands, such as O:358,1,1; 'O:358,1,1;O:358,1,2' is a group", "", Need::required);
   add_seconds(*command, "--timeout", options->timeout,
               "how long to wait for each confirmation (default 3)");
-  add_seconds(*command, "--hold", options->hold, "keep the link up that long after the last",
-              Zero::allowed);
+  add_seconds(*command, "--hold", options->hold,
+              "how long to keep the link up after the last command", Zero::allowed);
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON, one object a command");
 }

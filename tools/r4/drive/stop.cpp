@@ -60,7 +60,7 @@ void print_confirmed(const StopOptions& options, const CommandResult& result) {
   } else {
     print_text(
         "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
-        "it stays so until: r4 send {} E:CLEAR\n",
+        "it stays stopped until: r4 send {} E:CLEAR\n",
         ms, join_paths(options.urls));
   }
 }
@@ -97,16 +97,17 @@ int stop(const StopOptions& options) {
 }
 
 constexpr const char* stop_footer =
-    R"(Works whoever controls the board, and without waiting for a link: the stop is repeated every 20 ms
-until the board reports that it has obeyed this one, and for a moment longer. It stays stopped until
-E:CLEAR. By several paths to the board one that works is enough.
+    R"(The stop works even if another host controls the board, and does not wait for a link. r4 repeats the stop
+every 20 ms until the board reports that it has obeyed this stop, and for a moment longer. The board stays
+stopped until E:CLEAR. If the URLs are paths to one board, one working path is enough.
 
 Examples:
   r4 stop udp://192.168.0.125
   r4 stop serial:auto udp://192.168.0.125
 
-Exit codes: 0 the board reports that it has stopped; 3 it did not confirm: cut the power, or the URLs lead
-to two boards, which both were sent it; 4, 5 the transport cannot be opened: cut the power.)";
+Exit codes: 0 the board reports that it has stopped; 3 the board did not confirm the stop: cut the power;
+or the URLs lead to two boards, and r4 sent the stop to both; 4, 5 the transport cannot be opened: cut the
+power.)";
 
 }  // namespace
 
@@ -116,9 +117,9 @@ void add_stop(CLI::App& root, Action& chosen) {
       root, chosen, "stop", "Emergency stop: all outputs off, now", stop_footer, options, stop);
   add_paths(*command, options->urls);
   add_seconds(*command, "--timeout", options->timeout,
-              "how long to repeat it for a confirmation (default 2); it is sent in any case",
+              "how long to repeat an unconfirmed stop (default 2); r4 always sends it",
               Zero::allowed);
-  add_text(*command, "--key", options->key, "not needed: a board obeys a stop from anyone",
+  add_text(*command, "--key", options->key, "not needed: a board obeys a stop from any host",
            file_type);
   add_json(*command, options->json, "print JSON");
 }

@@ -58,7 +58,7 @@ void check_image(const std::string& path) {
         "give the .bin file of Sketch > Export Compiled Binary, for the board Arduino Giga R1");
   };
   std::ifstream file(path, std::ios::binary | std::ios::ate);
-  if (!file) throw Error(ErrorKind::open, path, std::strerror(errno), "look at its name");
+  if (!file) throw Error(ErrorKind::open, path, std::strerror(errno), "check the file name");
   const std::streamoff size = file.tellg();
   std::array<unsigned char, 8> begin{};
   file.seekg(0);
@@ -66,7 +66,8 @@ void check_image(const std::string& path) {
     refuse("it is not a compiled sketch: it is too short");
   }
   if (size > flash_size) {
-    refuse(fmt::format("{} bytes do not fit: the Giga takes {}", size, flash_size));
+    refuse(
+        fmt::format("it is too large: {} bytes, but the Giga has room for {}", size, flash_size));
   }
   const std::uint32_t stack = word(begin, 0);
   const std::uint32_t start = word(begin, 4);
@@ -81,7 +82,7 @@ void check_image(const std::string& path) {
 std::optional<std::string> port_of(const std::string& url) {
   const Url parsed = Url::parse(url);
   if (parsed.scheme() != "serial") {
-    throw Error(ErrorKind::usage, url, "a sketch goes over the board's USB cable alone",
+    throw Error(ErrorKind::usage, url, "a sketch can be written only over the board's USB cable",
                 "give serial:auto, serial:?sn=... or serial:///dev/ttyACM0");
   }
   if (!parsed.path().empty() && parsed.path() != "auto") return parsed.path();
@@ -92,13 +93,13 @@ std::optional<std::string> port_of(const std::string& url) {
     if (!port.is_r4 || (number && port.serial_number != *number)) continue;
     if (path) {
       throw Error(ErrorKind::usage, url, fmt::format("{} and {} are boards", *path, port.path),
-                  "name one by its number, as r4 list shows it");
+                  "name one board by its serial number, which r4 list shows");
     }
     path = port.path;
   }
   if (number && !path) {
-    throw Error(ErrorKind::open, url, "no board with this number runs at USB",
-                "plug it in; if it waits in its boot loader, give serial:auto");
+    throw Error(ErrorKind::open, url, "no board with this serial number runs at USB",
+                "plug the board in; if it waits in its boot loader, give serial:auto");
   }
   return path;
 }
@@ -112,12 +113,12 @@ class Port {
     const bool denied = error == EACCES || error == EPERM;
     if (error != 0 && error != EBUSY) {
       throw Error(denied ? ErrorKind::permission : ErrorKind::open, path_, std::strerror(error),
-                  "r4 doctor serial:auto");
+                  "run r4 doctor serial:auto");
     }
     if (error == EBUSY || ::flock(number_, LOCK_EX | LOCK_NB) != 0) {
       close();
       throw Error(ErrorKind::open, path_, "another program uses the port",
-                  "close it: r4 list shows which one");
+                  "close that program: r4 list shows its name");
     }
   }
   ~Port() { close(); }
@@ -175,7 +176,7 @@ void switch_off(const UploadOptions& options) {
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::refused) throw;
     return report(options, {{"type", "silent"}},
-                  "no R4 firmware answers: this command cannot switch outputs off");
+                  "R4 firmware does not answer, so r4 cannot switch outputs off");
   }
   board.stop();
   report(options, {{"type", "stopped"}}, "the board reports that its outputs are off");
@@ -189,12 +190,12 @@ std::string wait_for_boot_loader(const std::string& usb_path, Clock::time_point 
     if (std::find(usb_paths.begin(), usb_paths.end(), usb_path) != usb_paths.end()) return usb_path;
     if (usb_path.empty() && usb_paths.size() == 1) return usb_paths.front();
     if (usb_path.empty() && usb_paths.size() > 1) {
-      throw Error(ErrorKind::usage, "the boot loader", "several boards wait in it",
-                  "unplug all boards but one");
+      throw Error(ErrorKind::usage, "the boot loader", "two or more boards wait in it",
+                  "unplug all boards except one");
     }
     if (denied) {
       throw Error(ErrorKind::permission, "the boot loader (USB 2341:0366)", "permission denied",
-                  "install the udev rules, which r4 doctor --udev-rules prints, or run it as root");
+                  "install the udev rules, which r4 doctor --udev-rules prints, or run r4 as root");
     }
     if (Clock::now() >= deadline) {
       throw Error(ErrorKind::open, "the boot loader (USB 2341:0366)", "it was not found",
@@ -236,8 +237,9 @@ void wait_for_board(const UploadOptions& options, Clock::time_point deadline) {
     }
     std::this_thread::sleep_for(pause);
   }
-  throw Error(ErrorKind::refused, options.url, "the sketch is written, but no R4 firmware answers",
-              "see whether the sketch is R4Board, and what r4 doctor reports");
+  throw Error(ErrorKind::refused, options.url,
+              "the sketch is written, but R4 firmware does not answer",
+              "check that the sketch is R4Board, and run r4 doctor");
 }
 
 int upload(const UploadOptions& options) {
@@ -250,11 +252,11 @@ int upload(const UploadOptions& options) {
   if (port && usb_path.empty() && waits) {
     throw Error(
         ErrorKind::usage, "the boot loader", "another board waits in it",
-        fmt::format("unplug that board to write the one at {}, or the other way round", *port));
+        fmt::format("unplug one board: the board in the boot loader, or the board at {}", *port));
   }
   if (!port && !waits) {
     throw Error(ErrorKind::open, options.url, "no board was found at USB",
-                "plug it in; or press its reset button twice, until its green light pulses");
+                "plug a board in, or press its reset button twice, until its green light pulses");
   }
   if (port) {
     switch_off(options);
@@ -266,19 +268,19 @@ int upload(const UploadOptions& options) {
 }
 
 constexpr const char* upload_footer =
-    R"(FILE is what the Arduino IDE makes by Sketch > Export Compiled Binary. The command stops the board,
-starts its boot loader (1200 baud), writes the sketch with dfu-util, and waits until the board reports
-its version. With serial:auto and no running board at USB, the board that waits in its boot loader (reset
-button pressed twice) is written at once. Ctrl-C does not end a write that has begun. Keep the wheels off
+    R"(FILE is the file that the Arduino IDE makes by Sketch > Export Compiled Binary. r4 stops the board, starts
+its boot loader (1200 baud), writes the sketch with dfu-util, and waits until the board reports its
+version. With serial:auto, if no running board is at USB, r4 writes at once to the board that waits in its
+boot loader (press the reset button twice). Ctrl-C does not end a write that has begun. Keep the wheels off
 the ground: a sketch that is not R4's may drive outputs.
 
 Examples:
   r4 upload R4Board.ino.bin
   r4 upload R4Board.ino.bin serial:///dev/ttyACM0
 
-Exit codes: 0 the board runs the sketch; 1 the file is not a sketch for the Giga; 2 usage, also a URL that
-is not a cable; 3 the board did not confirm the stop, or the sketch is written, but no R4 firmware answers;
-4 no board, no boot loader, or dfu-util failed; 5 permission denied; 6 dfu-util is not installed.)";
+Exit codes: 0 the board runs the sketch; 1 the file is not a sketch for the Giga; 2 usage, or the URL is
+not a cable; 3 the board did not confirm the stop, or the sketch is written, but R4 firmware does not
+answer; 4 no board, no boot loader, or dfu-util failed; 5 permission denied; 6 dfu-util is not installed.)";
 
 }  // namespace
 
@@ -290,7 +292,7 @@ void add_upload(CLI::App& root, Action& chosen) {
            Need::required);
   add_text(*command, "URL", options->url, "where the board is (default serial:auto)", url_type);
   add_seconds(*command, "--timeout", options->timeout,
-              "how long to wait for the boot loader, and then for the board (default 20)");
+              "how long to wait for the boot loader, then for the board (default 20)");
   add_json(*command, options->json, "print JSON");
 }
 

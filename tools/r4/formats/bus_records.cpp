@@ -45,13 +45,13 @@ void BusRecords::on_frame(std::string_view interface, const CanFrame& frame,
                           const BusTransfers::Place& place) {
   transfers_.pass_time(place.time_us);
   if (transfers_.on_frame(interface, frame, place) == BusTransfers::Frame::too_many_interfaces) {
-    damage(place, "more than 32 interfaces");
+    damage(place, "a frame of an interface after the first 32");
   }
 }
 
 void BusRecords::finish() {
   for (const BusTransfers::Lane* const lane : transfers_.unfinished()) {
-    damage(lane->last, "the rest of this datagram is not there");
+    damage(lane->last, "a datagram whose rest is missing");
   }
 }
 
@@ -59,7 +59,7 @@ void BusRecords::on_datagram(const BusTransfers::Lane& lane) {
   UnpackRoom room;
   const PlainForm plain = plain_form(lane.receiver.data(), lane.receiver.size(), room);
   if (plain.problem != nullptr) {
-    return damage(lane.last, fmt::format("a packed datagram that is none: {}", plain.problem));
+    return damage(lane.last, fmt::format("a packed datagram that is not valid: {}", plain.problem));
   }
   const std::uint16_t path = path_of(lane.interface, lane.meaning.node);
   const bool from_host = lane.meaning.kind == CanIdKind::command;
@@ -70,7 +70,7 @@ void BusRecords::on_datagram(const BusTransfers::Lane& lane) {
 void BusRecords::on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
                             IsotpError error) {
   const Text reason = to_text(error);
-  damage(place, fmt::format("a datagram of node {} that is not whole: {}", lane.meaning.node,
+  damage(place, fmt::format("an incomplete datagram of node {}: {}", lane.meaning.node,
                             std::string_view(reason.data(), reason.size())));
 }
 

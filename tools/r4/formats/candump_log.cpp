@@ -31,7 +31,7 @@ void CandumpSource::feed(std::string_view bytes) {
   lines_.push(
       bytes, [this](std::uint64_t number, std::string_view text) { on_line(number, text); },
       [this](std::uint64_t number, std::uint64_t) {
-        damage(number, "longer than any line of candump");
+        damage(number, "a line that is too long for candump");
       });
   if (!recognised_ && lines_.begin() > patience) fail_as_none();
 }
@@ -39,16 +39,16 @@ void CandumpSource::feed(std::string_view bytes) {
 void CandumpSource::finish() {
   lines_.finish([this](std::uint64_t number, std::string_view text) { on_line(number, text); },
                 [this](std::uint64_t number, std::uint64_t) {
-                  damage(number, "longer than any line of candump");
+                  damage(number, "a line that is too long for candump");
                 });
   if (!recognised_) fail_as_none();
   records_.finish();
   if (start_ && frames_ > 1 && latest_us_ == first_us_) {
-    fail("all of its times are the same (candump -H without hardware time stamps)",
+    fail("all its times are the same (candump -H without hardware time stamps)",
          "record it again with candump -L");
   }
   if (!records_.told() && !undated_) {
-    fail("no whole datagram of a board is in it",
+    fail("does not contain a complete datagram of a board",
          "record on the bus of the board for a second or longer: candump -L can0");
   }
 }
@@ -60,13 +60,13 @@ void CandumpSource::on_line(std::uint64_t number, std::string_view text) {
   if (error != CandumpError::none) return damage(number, to_text(error));
   if (!line.time_us || line.date) {
     undated_ = true;
-    return damage(number, "it has no time since 1970: candump -L writes one");
+    return damage(number, "a line without a time since 1970, which candump -L writes");
   }
   if (!start_ && *line.time_us < earliest_us) {
-    if (recognised_) return damage(number, "its time does not count from 1970");
+    if (recognised_) return damage(number, "a line whose time does not count from 1970");
     fail("its times do not count from 1970 (candump -tz, -td or -H)",
-         "of -tz, say when the first frame was: r4 convert --start 2026-11-23T21:20:00 (UTC); "
-         "else record it again with candump -L");
+         "for -tz, give the time of the first frame: r4 convert --start 2026-11-23T21:20:00 (UTC); "
+         "otherwise record it again with candump -L");
   }
   const std::uint64_t time_us = dated(*line.time_us);
   recognised_ = true;
@@ -81,7 +81,7 @@ std::uint64_t CandumpSource::dated(std::uint64_t time_us) {
   latest_us_ = std::max(latest_us_, time_us);
   if (!start_) return time_us;
   if (goes_back) {
-    fail("its times go back, so they do not count from the first frame (candump -td)",
+    fail("its times decrease, so they do not count from the first frame (candump -td)",
          "record it again with candump -L");
   }
   return static_cast<std::uint64_t>(start_->count()) + (std::max(time_us, first_us_) - first_us_);
@@ -96,7 +96,7 @@ void CandumpSource::fail(const char* reason, const char* fix) const {
 }
 
 void CandumpSource::fail_as_none() const {
-  fail("no log of CAN frames", "candump -L can0 > FILE makes one");
+  fail("is not a log of CAN frames", "make a log: candump -L can0 > FILE");
 }
 
 std::optional<CandumpSink::Place> CandumpSink::place_of(const RecordedPath& path) {
@@ -171,12 +171,12 @@ bool CandumpSink::write_frames(const Place& place, const Record& record) {
 void CandumpSink::finish() {
   if (written_ != 0) return;
   throw Error(ErrorKind::data, elsewhere_.empty() ? "the recording" : elsewhere_,
-              "nothing of it went over a CAN bus, whose frames this format holds",
+              "has no datagrams from a CAN bus, but this format stores only CAN frames",
               "convert it to .mcap, .pcapng, .csv or .jsonl");
 }
 
 std::string CandumpSink::left_out() const {
-  return others_ == 0 ? std::string() : fmt::format("{} that have no frames on a bus", others_);
+  return others_ == 0 ? std::string() : fmt::format("{} records without frames on a bus", others_);
 }
 
 }  // namespace r4::tool

@@ -169,11 +169,13 @@ void CsvSink::finish() {
 }
 
 std::string CsvSink::left_out() const {
-  std::string text = others_ == 0 ? std::string() : fmt::format("{} that are not states", others_);
+  std::string text =
+      others_ == 0 ? std::string() : fmt::format("{} records that are not states", others_);
   if (!devices_.problems().empty()) text += (text.empty() ? "" : ", ") + devices_.problems();
   if (!late_.empty()) {
     text += fmt::format(
-        "{}what {} measured, which a pipe tells behind the first record (convert the file itself)",
+        "{}measurements of {}, which a pipe declares after the first record (convert the file "
+        "itself)",
         text.empty() ? "" : ", ", late_);
   }
   return text;

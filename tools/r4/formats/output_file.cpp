@@ -19,12 +19,11 @@ OutputFile::OutputFile(std::string path, bool replace)
   if (::lstat(path_.c_str(), &status) == 0) {
     if (!S_ISREG(status.st_mode)) {
       throw Error(ErrorKind::open, path_,
-                  S_ISDIR(status.st_mode) ? "is a directory" : "is not a file",
-                  "name a file that is not there yet");
+                  S_ISDIR(status.st_mode) ? "is a directory" : "is not a file", "name a new file");
     }
     if (!replace_) {
-      throw Error(ErrorKind::open, path_, "is there already",
-                  "name another file, or replace it: --force");
+      throw Error(ErrorKind::open, path_, "already exists",
+                  "name another file, or add --force to replace this file");
     }
   }
   // An unnamed file disappears if the program ends early. Not every file system supports O_TMPFILE.
@@ -70,7 +69,7 @@ void OutputFile::fail(int error) const {
   const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
   throw Error(denied ? ErrorKind::permission : ErrorKind::open, path_, std::strerror(error),
               denied ? "name a directory that you may write to"
-              : full ? "make room there, or name a file on another disk"
+              : full ? "free some space on this disk, or name a file on another disk"
                      : "name a file that can be written");
 }
 

@@ -29,7 +29,7 @@ const Device* RecordedDevices::on_device(const RecordedDevice& told) {
     if (all_.size() < most_devices) {
       return &all_.emplace_back(Known{told.path, std::move(device)}).device;
     }
-    add_problem(told.place + ": one device too many");
+    add_problem(told.place + ": more devices than r4 reads");
   } catch (const Error& error) {
     add_problem(error.what());
   }

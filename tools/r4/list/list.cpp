@@ -32,7 +32,7 @@ std::vector<FoundBoard> boards_at(const Discovery& all, const std::string& place
 }
 
 std::string text_of(const FoundBoard& board) {
-  std::string text = "it does not tell who it is";
+  std::string text = "it does not report its identity";
   if (board.identity) {
     text = fmt::format("id {}{}, firmware {}", board.identity->board_id,
                        board.identity->name.empty() ? "" : ", name " + board.identity->name,
@@ -41,7 +41,7 @@ std::string text_of(const FoundBoard& board) {
   if (board.busy && !board.holder_controls) {
     text += *board.busy ? ", controlled by a host" : ", free";
   }
-  if (board.foreign_frames) text += ", frames that are not R4's come on its command id";
+  if (board.foreign_frames) text += ", its command id also has frames that are not R4's";
   if (const std::optional<Program>& holder = board.holder) {
     text +=
         holder->name.empty()
@@ -72,7 +72,7 @@ void print_ports(const Discovery& all) {
     const std::vector<FoundBoard> boards = boards_at(all, port.path);
     for (const FoundBoard& board : boards) print_board(board);
     if (port.asked && boards.empty()) {
-      print_text("    no R4 board has answered: {}\n", printable(port.url));
+      print_text("    no R4 board answered at {}\n", printable(port.url));
     }
     print_trouble_of(port.trouble);
   }
@@ -87,7 +87,7 @@ void print_buses(const Discovery& all) {
                                                : fmt::format("{} kbit/s", bus.bit_rate / 1000.0);
     print_text("  {:<14} {:<5}{:<14} {:<14}{}{}\n", printable(bus.interface),
                bus.up ? "up" : "down", bus.state, rate, bus.fd ? "CAN FD  " : "",
-               boards.empty() && !bus.trouble ? "no board heard" : "");
+               boards.empty() && !bus.trouble ? "no board found" : "");
     for (const FoundBoard& board : boards) print_board(board);
     print_trouble_of(bus.trouble);
   }
@@ -103,7 +103,7 @@ void print_networks(const Discovery& all) {
     for (const FoundBoard& board : boards) print_board(board);
     print_trouble_of(network.trouble);
   }
-  if (all.more) print_text("  more than {} answered\n", Discovery::most_answers);
+  if (all.more) print_text("  more than {} boards answered\n", Discovery::most_answers);
 }
 
 void describe(const FoundBoard& board, Json& object) {
@@ -190,23 +190,23 @@ int list(const Options& options) {
 }
 
 constexpr const char* footer =
-    R"(Each board is listed with the URL to use, its id, its name (C:name, over USB), its firmware, and
-whether a host controls it: with name and pid where that is a program of this machine, which is not
-disturbed.
+    R"(For each board, r4 lists the URL to use, the id, the name (C:name, over USB), the firmware, and whether a
+host controls the board. If the host is a program of this machine, r4 also lists its name and pid. The
+search does not disturb that program.
 
-On USB a board is known by its id, 2341:0266 (Arduino Giga R1), and asked who it is; --serial asks at
-a port that has another id: an adapter's, or the pty of a simulated board. On CAN interfaces that are
-up it listens for 0.7 s, and asks the boards that no host controls. On networks it asks by IPv4
-broadcast, three times within half a second. A controlled board is heard when its host asks it. The
-search takes 1.3 s at most.
+On USB, r4 recognizes a board by its USB id, 2341:0266 (Arduino Giga R1), and asks for its identity.
+--serial also asks at a port with another USB id: an adapter, or the pty of a simulated board. On CAN
+interfaces that are up, r4 listens for 0.7 s, and asks the boards that no host controls. On networks,
+r4 asks by IPv4 broadcast, three times within half a second. r4 hears a controlled board when its host
+asks the board. The search takes at most 1.3 s.
 
-Broadcast passes no router, and often no VPN, container or WiFi with client isolation:
-there give the board's address, as in udp://192.168.1.77. A firewall must let in UDP from port 2018.
+A broadcast does not pass routers, and often does not pass VPNs, containers or WiFi with client isolation.
+There, give the board's address, as in udp://192.168.1.77. A firewall must let in UDP from port 2018.
 
-With --json one object a line: {"type":"port"…} of a serial port, {"type":"can"…} of a CAN interface,
-{"type":"udp"…} of a network, with their boards, {"type":"scheme"…} of a transport.
+With --json, r4 prints one object a line: {"type":"port"…} for a serial port, {"type":"can"…} for a CAN
+interface, {"type":"udp"…} for a network, each with its boards, and {"type":"scheme"…} for a transport.
 
-Exit codes: 0 done, also when there are none.)";
+Exit codes: 0 done, even without any board.)";
 
 }  // namespace
 
@@ -219,7 +219,7 @@ void add_list(CLI::App& root, Action& chosen) {
   add_number(*command, "--port", options->port, 1, 65535,
              "the UDP port at which boards listen (default 2018)");
   add_repeated(*command, "--serial", options->serial,
-               "ask at this serial port, too, whatever its USB id; may be repeated", file_type);
+               "also ask at this serial port, with any USB id; may be repeated", file_type);
   add_json(*command, options->json, "print JSON, one object a line");
 }
 

@@ -26,8 +26,9 @@ constexpr std::size_t most_channels = 1000;
 std::uint64_t nanoseconds(Time time) {
   constexpr std::int64_t last_us = 18'446'744'073'709'551;
   if (time.count() > last_us) {
-    throw Error(ErrorKind::data, record_time_text(time), "MCAP has no times beyond the year 2554",
-                "convert it to .jsonl, or set the host's clock before it records");
+    throw Error(ErrorKind::data, record_time_text(time),
+                "MCAP cannot store times after the year 2554",
+                "convert it to .jsonl, or set the host's clock before you record");
   }
   return static_cast<std::uint64_t>(time.count()) * 1000;
 }
@@ -271,7 +272,7 @@ McapSink::Channel& McapSink::add_channel(std::uint16_t path, const std::string& 
                                          std::uint16_t schema_id) {
   if (channels_.size() == most_channels) {
     throw Error(ErrorKind::data, topic, "the recording has more than 1000 boards",
-                "is it damaged? r4 info FILE tells; convert it to .jsonl");
+                "check it for damage with r4 info FILE, or convert it to .jsonl");
   }
   const std::string& url = urls_[path];
   Channel& channel = channels_[{path, topic, url}];

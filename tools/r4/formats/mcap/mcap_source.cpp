@@ -54,13 +54,13 @@ void McapSource::feed(std::string_view bytes) {
 
 void McapSource::finish() {
   if (part_ == Part::magic || part_ == Part::header) fail_as_none();
-  if (part_ != Part::end) damage("the file ends here; it is not whole");
+  if (part_ != Part::end) damage("the file is incomplete: it ends here");
   const bool any_of_ours = std::any_of(channels_.begin(), channels_.end(), [](const auto& each) {
     return each.second.path.has_value();
   });
   if (!ours_ && !any_of_ours) {
-    throw Error(ErrorKind::data, name_, "an MCAP file that is not a recording of r4",
-                "convert what r4 record or r4 convert has made");
+    throw Error(ErrorKind::data, name_, "is an MCAP file, but not a recording of r4",
+                "convert a file that r4 record or r4 convert has made");
   }
 }
 
@@ -94,7 +94,7 @@ std::size_t McapSource::take_next(std::string_view bytes) {
     if (part_ == Part::header) fail_as_none();
     damage(known ? "a record of more than 256 MiB; make chunks smaller: mcap compress "
                    "--chunk-size 4194304 FILE.mcap -o NEW.mcap"
-                 : "no record of MCAP");
+                 : "not a record of MCAP");
     searching_ = true;
     return 1;
   }
@@ -109,7 +109,8 @@ std::size_t McapSource::take_next(std::string_view bytes) {
     part_ = Part::end;
   } else if (op == Op::data_end) {
     const auto expected = Fields(content).number<std::uint32_t>();
-    if (expected != 0 && expected != crc_ && !any_damage_) damage("the checksum of all before");
+    if (expected != 0 && expected != crc_ && !any_damage_)
+      damage("the checksum of the earlier data is wrong");
     part_ = Part::summary;
   } else if (part_ == Part::data) {
     on_data_record(op, content);
@@ -154,7 +155,7 @@ void McapSource::on_channel(std::string_view content) {
                                                       : nullptr;
     if (text != nullptr && !append_unescaped(*text, value)) text->clear();
   }
-  if (!fields.good() || !metadata.good()) return damage("a channel that is not whole");
+  if (!fields.good() || !metadata.good()) return damage("an incomplete channel");
   if (encoding != "json") channel.path.reset();
   // Each chunk repeats the channels of its messages.
   Channel& known = channels_[id];
@@ -169,16 +170,16 @@ void McapSource::on_chunk(std::string_view content) {
   const auto crc = fields.number<std::uint32_t>();
   const std::string_view compression = fields.string();
   const std::string_view bytes = fields.take(fields.number<std::uint64_t>());
-  if (!fields.good() || size > max_record) return damage("a chunk that is not whole");
-  if (!unpack(compression, bytes, size)) return damage("a chunk that does not unpack");
+  if (!fields.good() || size > max_record) return damage("an incomplete chunk");
+  if (!unpack(compression, bytes, size)) return damage("a chunk that cannot be decompressed");
   if (crc != 0 && crc != libdeflate_crc32(0, chunk_.data(), chunk_.size()))
-    return damage("a chunk whose checksum is wrong");
+    return damage("a chunk with a wrong checksum");
   std::string_view rest = chunk_;
   while (!rest.empty()) {
     Fields record(rest);
     const auto op = static_cast<Op>(record.number<std::uint8_t>());
     const std::string_view inside = record.take(record.number<std::uint64_t>());
-    if (!record.good()) return damage("a chunk whose last record is not whole");
+    if (!record.good()) return damage("a chunk with an incomplete last record");
     if (op != Op::chunk) on_data_record(op, inside);
     rest = record.rest();
   }
@@ -209,7 +210,8 @@ void McapSource::on_message(std::string_view content) {
   static_cast<void>(fields.number<std::uint32_t>());  // sequence number
   const auto time_ns = fields.number<std::uint64_t>();
   static_cast<void>(fields.number<std::uint64_t>());
-  if (!fields.good() || channel == channels_.end()) return damage("a message of no channel");
+  if (!fields.good() || channel == channels_.end())
+    return damage("a message without a known channel");
   if (!channel->second.path) return;  // from another program
   const Json object = Json::parse(fields.rest(), nullptr, false);
   const auto text_of = [&object](const char* key) {
@@ -254,7 +256,7 @@ void McapSource::damage(std::string_view reason) {
 }
 
 void McapSource::fail_as_none() const {
-  throw Error(ErrorKind::data, name_, "no MCAP file", "r4 convert FILE -o x.mcap makes one");
+  throw Error(ErrorKind::data, name_, "is not an MCAP file", "make one: r4 convert FILE -o x.mcap");
 }
 
 }  // namespace r4::tool

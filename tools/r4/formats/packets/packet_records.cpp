@@ -143,21 +143,22 @@ void PacketRecords::be(Kind kind) {
 void PacketRecords::finish(bool any_damage) {
   bus_.finish();
   if (told_ || bus_.told() || any_damage) return;
-  std::string reason = "no datagram of a board is in it: ";
+  std::string reason = "does not contain a datagram of a board: ";
   if (!unread_links_.empty()) {
-    reason += "packets of link types that are not read: " + listed(unread_links_, link_name);
+    reason += "packets have link types that r4 does not read: " + listed(unread_links_, link_name);
   } else if (!ports_.empty()) {
-    reason += fmt::format("nothing is of UDP port {}, but of: {}", port_,
+    reason += fmt::format("packets do not use UDP port {}, but: {}", port_,
                           listed(ports_, [](std::uint16_t port) { return std::to_string(port); }));
   } else {
-    reason += fmt::format("{} packets, none of UDP or of a board's frames on a CAN bus", packets_);
+    reason +=
+        fmt::format("{} packets are neither UDP nor frames of a board on a CAN bus", packets_);
   }
   const char* const fix =
       !ports_.empty() ? "name the boards' port: r4 convert --port PORT"
       : !unread_links_.empty()
-          ? "capture on the interface by which this computer talks to the board: tcpdump -i wlan0 "
+          ? "capture on the interface that connects this computer to the board: tcpdump -i wlan0 "
             "-w FILE udp port 2018"
-          : "capture while the board is heard: tcpdump -i any -w FILE udp port 2018";
+          : "capture while the board sends: tcpdump -i any -w FILE udp port 2018";
   throw Error(ErrorKind::data, name_, reason, fix);
 }
 
@@ -203,7 +204,7 @@ void PacketRecords::on_own(const PacketInterface& interface, const Packet& packe
   Udp udp;
   const auto number = number_in<std::uint16_t>(path);
   if (!number || !read_ip(packet.bytes, udp)) {
-    return damage(packet, "no datagram of a recording");
+    return damage(packet, "the packet is not a datagram of a recording");
   }
   if (packet.cut || udp.cut) return damage(packet, "the packet is cut");
   const bool to_board = udp.from == made_up_host_text;
@@ -251,11 +252,11 @@ void PacketRecords::on_ip(std::string_view bytes, const Packet& packet) {
     ++ports_[udp.to_port];
     return;
   }
-  if (udp.cut) return damage(packet, "the packet is cut: capture it whole, tcpdump -s 0");
+  if (udp.cut) return damage(packet, "the packet is cut: capture whole packets with tcpdump -s 0");
   if (is_repeated(udp, packet.time)) return;
   be(Kind::captured);
   const std::uint16_t path = path_of(from_board ? udp.from : udp.to);
-  if (path == no_path) return damage(packet, "more than 1000 boards");
+  if (path == no_path) return damage(packet, "a packet of a board after the first 1000");
   visitor_.on_record({packet.time, path, from_board ? RecordKind::from_board : RecordKind::to_board,
                       without_end(udp.payload)});
 }
@@ -291,7 +292,7 @@ void PacketRecords::on_can(std::string_view interface, std::uint32_t id, std::st
     return damage(packet, "the frame is cut");
   }
   frame.size = static_cast<std::uint8_t>(size);
-  if (!has_valid_size(frame)) return damage(packet, "no frame has that many bytes");
+  if (!has_valid_size(frame)) return damage(packet, "the number of bytes is not valid for a frame");
   if (!frame.remote) std::copy_n(bytes.data() + can_header, size, frame.data);
   if (kind_ == Kind::recorded) be(Kind::captured);
   bus_.on_frame(interface.empty() ? "can0" : interface, frame,

@@ -32,8 +32,8 @@ void PcapSource::feed(std::string_view bytes) {
 void PcapSource::finish() {
   take(true);
   if (form_ == Form::unknown) {
-    throw Error(ErrorKind::data, name_, "no capture of packets",
-                "tcpdump -w FILE udp port 2018 makes one");
+    throw Error(ErrorKind::data, name_, "is not a capture of packets",
+                "make one: tcpdump -w FILE udp port 2018");
   }
   records_.finish(any_damage_);
 }
@@ -77,8 +77,8 @@ void PcapSource::begin(std::string_view bytes) {
       return;
     }
   }
-  throw Error(ErrorKind::data, name_, "no capture of packets",
-              "tcpdump -w FILE udp port 2018 makes one");
+  throw Error(ErrorKind::data, name_, "is not a capture of packets",
+              "make one: tcpdump -w FILE udp port 2018");
 }
 
 // Each take_…() returns the number of bytes taken; 0: more bytes are needed.
@@ -86,12 +86,12 @@ std::size_t PcapSource::take_pcap_packet(std::string_view bytes, bool at_end) {
   const bool head = bytes.size() >= pcap_packet_header;
   const std::uint32_t size = head ? number<std::uint32_t>(bytes, 8) : 0;
   if (size > max_block) {
-    damage("no packet is that long; the rest cannot be read");
+    damage("the length of a packet is not valid, so the rest cannot be read");
     form_ = Form::broken;
     return bytes.size();
   }
   if (!head || bytes.size() < pcap_packet_header + size) {
-    if (at_end) damage("the last packet is not whole");
+    if (at_end) damage("the last packet is incomplete");
     return at_end ? bytes.size() : 0;
   }
   const Interface& interface = interfaces_.front();
@@ -107,7 +107,7 @@ std::size_t PcapSource::take_block(std::string_view bytes, bool at_end) {
   if (bytes.size() < block_ends + 4) {
     if (!at_end) return 0;
     if (bytes.size() < block_ends) {
-      if (!searching_) damage("the last block is not whole");
+      if (!searching_) damage("the last block is incomplete");
       return bytes.size();
     }
   }
@@ -126,12 +126,12 @@ std::size_t PcapSource::take_block(std::string_view bytes, bool at_end) {
                          (!searching_ || is_known_block(type));
   if (!plausible) {
     order_ = before;
-    return damaged_block("no block of pcapng");
+    return damaged_block("not a block of pcapng");
   }
   if (bytes.size() < size) {
     order_ = before;
     if (!at_end) return 0;
-    return damaged_block("the last block is not whole");
+    return damaged_block("the last block is incomplete");
   }
   if (number<std::uint32_t>(bytes, size - 4) != size) {
     order_ = before;
@@ -164,10 +164,10 @@ void PcapSource::on_block(std::uint32_t type, std::string_view body) {
 }
 
 void PcapSource::on_interface(std::string_view body) {
-  if (interfaces_.size() == most_interfaces) return damage("more interfaces than are read");
+  if (interfaces_.size() == most_interfaces) return damage("more interfaces than r4 reads");
   Interface& interface = interfaces_.emplace_back();
   interface.number = interface_count_++;
-  if (body.size() < 8) return damage("an interface that is not whole");
+  if (body.size() < 8) return damage("an incomplete interface");
   interface.link_type = number<std::uint16_t>(body, 0);
   body.remove_prefix(8);
   while (body.size() >= 4) {
@@ -184,7 +184,7 @@ void PcapSource::on_interface(std::string_view body) {
       const auto power = static_cast<std::uint8_t>(value[0]);
       const bool binary = (power & 0x80) != 0;
       if ((power & 0x7F) > (binary ? 62 : 18)) {
-        damage("an interface whose times are finer than any clock");
+        damage("an interface whose time resolution is not valid");
       } else {
         interface.ticks = 1;
         for (int i = power & 0x7F; i > 0; --i) interface.ticks *= binary ? 2 : 10;
@@ -195,22 +195,22 @@ void PcapSource::on_interface(std::string_view body) {
 }
 
 void PcapSource::on_pcapng_packet(std::string_view body) {
-  if (body.size() < packet_head) return damage("a packet that is not whole");
+  if (body.size() < packet_head) return damage("an incomplete packet");
   on_packet_of(number<std::uint32_t>(body, 0), body);
 }
 
 // An obsolete packet block has a 16-bit interface, then a count of dropped packets.
 void PcapSource::on_old_packet(std::string_view body) {
-  if (body.size() < packet_head) return damage("a packet that is not whole");
+  if (body.size() < packet_head) return damage("an incomplete packet");
   on_packet_of(number<std::uint16_t>(body, 0), body);
 }
 
 void PcapSource::on_packet_of(std::uint32_t index, std::string_view body) {
-  if (index >= interfaces_.size()) return damage("a packet of an interface that is not there");
+  if (index >= interfaces_.size()) return damage("a packet of an unknown interface");
   const std::uint64_t ticks =
       std::uint64_t{number<std::uint32_t>(body, 4)} << 32 | number<std::uint32_t>(body, 8);
   const auto size = number<std::uint32_t>(body, 12);
-  if (size > body.size() - packet_head) return damage("a packet that is not whole");
+  if (size > body.size() - packet_head) return damage("an incomplete packet");
   records_.on_packet(interfaces_[index],
                      {time_of(interfaces_[index], ticks), offset_, body.substr(packet_head, size),
                       number<std::uint32_t>(body, 16) > size});

@@ -95,8 +95,8 @@ void PcapngSink::begin() {
   append_number(block_, std::uint16_t{0});
   append_number(block_, ~std::uint64_t{0});  // section length: unknown
   append_option(block_, opt_comment,
-                "Made of a recording by r4 convert: headers of packets, and addresses of "
-                "198.18.0.0/15, are made up.");
+                "Made from a recording by r4 convert. The packet headers and the addresses in "
+                "198.18.0.0/15 are invented.");
   append_option(block_, shb_userappl, "r4 " R4LINK_VERSION);
   append_number(block_, std::uint32_t{0});
   end_block(block_);
