@@ -225,7 +225,7 @@ ReceivedState Board::next_state(Duration timeout) {
   const std::uint64_t seen = impl->read(impl->states);
   if (!impl->wait_for_news(timeout, [&] { return impl->states != seen; })) {
     Problem problem = explain(impl->read(impl->name), impl->read(impl->link));
-    problem.reason = "no state came in time: " + problem.reason;
+    problem.reason = "a state did not arrive in time: " + problem.reason;
     throw Error(std::move(problem));
   }
   return impl->read(impl->state);

@@ -14,7 +14,7 @@
 namespace r4 {
 
 Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first)
-    : BlockingLoop({"board", "a transport of your own must return at once"}, 1,
+    : BlockingLoop({"board", "let the functions of your own transport return at once"}, 1,
                    std::move(options.on_wait)),
       arming(options.session.arming),
       callback_limit(options.callback_limit),
@@ -74,10 +74,9 @@ void Board::Impl::calibrate_servo(int channel, const ServoCalibration& calibrati
 }
 ServoCalibration Board::Impl::servo_calibration(int channel) {
   if (const auto known = read(servo_calibrations[servo_index(channel)])) return *known;
-  throw Error(
-      ErrorKind::usage, fmt::format("servo({})", channel), "the servo was not calibrated",
-      "call calibrate() first, with the pulse and the angle at each end of its travel; or set "
-      "a pulse in microseconds");
+  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "the servo is not calibrated",
+              "call calibrate() first, with the pulse and the angle at each end of the servo's "
+              "travel; or set a pulse in microseconds");
 }
 
 void Board::Impl::keep(std::unique_ptr<Recording> own) {
@@ -162,8 +161,9 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
     callbacks.notify(CarrierEvent{
         CarrierEvent::Kind::warning,
         Problem{ErrorKind::refused, "a callback",
-                "it ran for " + std::to_string(ms) + " ms, and after " +
-                    std::to_string(callback_limit.count()) + " ms the heartbeats stopped",
+                "the callback ran for " + std::to_string(ms) +
+                    " ms, and the heartbeats stopped after " +
+                    std::to_string(callback_limit.count()) + " ms",
                 "do the work in another thread, or set BoardOptions::callback_limit"}});
   });
 }

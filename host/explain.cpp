@@ -22,51 +22,54 @@ CauseWords words_of(LinkCause cause) {
     case LinkCause::transport_down:
       return {"transport down",
               "the transport is down: unplugged, or its interface is switched off",
-              "plug it in or switch it on; it is opened again by itself"};
+              "plug it in or switch it on; it is then opened again automatically"};
     case LinkCause::two_boards:
-      return {"two boards", "its paths lead to two boards", "give the URLs of one board"};
+      return {"two boards", "the paths lead to two boards", "give the URLs of one board"};
     case LinkCause::watchdog:
       return {"watchdog", "the application watchdog has stopped our heartbeats and commands",
-              "call feed() at least once in the watchdog's period; a call that waits does not "
-              "feed: give it a timeout below that period"};
+              "call feed() at least once in the watchdog's period; give each call that waits a "
+              "timeout below that period"};
     case LinkCause::callback:
       return {"callback", "a callback does not return, so our heartbeats and commands have stopped",
-              "do its work in another thread; BoardOptions::callback_limit is the time that it "
-              "has"};
+              "do the work of the callback in another thread; BoardOptions::callback_limit is its "
+              "time limit"};
     case LinkCause::foreign_frames:
       return {"foreign frames",
-              "frames that make no R4 datagram come on the board's command id (0x180 + node): "
-              "another protocol, such as CANopen, uses it",
-              "r4 bus can://INTERFACE names the ids that are in use; give the board a node of "
-              "which no id is in use, or the other device another id"};
+              "the board's command id (0x180 + node) carries frames that are not R4 datagrams: "
+              "another protocol, such as CANopen, uses the id",
+              "find the ids in use with r4 bus can://INTERFACE; give the board a node whose ids "
+              "are free, or give the other device another id"};
     case LinkCause::busy:
       return {"busy", "another host controls the board",
-              "stop that host; control is free when its heartbeats have stayed away for the "
+              "end the other host; control becomes free when its heartbeats have stopped for the "
               "board's timeout (1 s)"};
     case LinkCause::board_has_no_key:
-      return {"board has no key", "the board has no key, so it obeys anyone: refused",
-              "give it ours over USB (r4 key give FILE URL), or open it without a key"};
+      return {"board has no key",
+              "the board has no key and obeys every host; a program with a key does not control it",
+              "give the board this program's key over USB (r4 key give FILE URL), or open the "
+              "board without a key"};
     case LinkCause::key_needed:
       return {"key needed", "the board obeys only hosts that have its key",
-              "open it with the key: --key FILE or R4_KEY of r4, SessionOptions::key in a "
+              "open the board with the key: --key FILE or R4_KEY of r4, SessionOptions::key in a "
               "program"};
     case LinkCause::key_not_taken:
       return {"key not taken",
-              "the board takes nothing that is signed with our key, or does not hear it",
-              "see that both have the same key (r4 key give FILE URL, over USB); where a round "
-              "trip takes more than 250 ms, signatures come too late"};
+              "the board does not accept datagrams that are signed with our key, or does not "
+              "receive them",
+              "check that both have the same key (r4 key give FILE URL, over USB), and that a "
+              "round trip takes less than 250 ms"};
     case LinkCause::watchers_full:
-      return {"watchers full", "as many programs watch the board as it serves",
-              "end one of them; its place is free two seconds later"};
+      return {"watchers full", "the board has reached its limit of watchers",
+              "end one of these programs; its place is free two seconds later"};
     case LinkCause::not_watchable:
       return {"not watchable",
-              "the board's firmware streams to the host that controls it, and to nobody else",
-              "bring it up to date, or take control: r4 monitor --control, BoardRole::control"};
+              "the board's firmware streams only to the host that controls the board",
+              "update the firmware, or take control: r4 monitor --control, BoardRole::control"};
     case LinkCause::late_frames:
       return {"late frames",
-              "flow control of the board does not come within 20 ms: the bus, or a tunnel or "
-              "adapter on it, holds frames back or loses them",
-              "ISO-TP needs each frame within 10 ms: use the bus without what is slow; "
+              "flow control of the board does not come within 20 ms: the bus, a tunnel or an "
+              "adapter delays or loses frames",
+              "use the bus without the slow part, because ISO-TP needs each frame within 10 ms; "
               "`r4 bench` measures the round trip"};
     case LinkCause::other_board:
       return {"other board", "a path leads to another board and is not used",
@@ -90,21 +93,21 @@ CauseWords words_of(DisarmCause cause) {
     case DisarmCause::handle:
       return {"handle", "the dead-man's handle was released", "hold the handle, "};
     case DisarmCause::proximity:
-      return {"proximity", "something came nearer than a proximity threshold", "clear the way, "};
+      return {"proximity", "an obstacle is nearer than a proximity threshold", "clear the way, "};
     case DisarmCause::watchdog:
       return {"watchdog", "a task of the board's firmware missed its deadline", "find out why, "};
     case DisarmCause::fault:
       return {"fault", "the board found a fault in itself", "check its chips and wiring, "};
     case DisarmCause::link:
-      return {"link", "the link was lost, and the board did not bring its outputs back", ""};
+      return {"link", "the link was lost, and the board did not restore its outputs", ""};
     case DisarmCause::restart:
-      return {"restart", "the board has begun again", "set its thresholds (U) again, "};
+      return {"restart", "the board has restarted", "set its thresholds (U) again, "};
     case DisarmCause::supply:
       return {"supply", "relay 1, the motor supply, was opened", ""};
     case DisarmCause::sleep:
       return {"sleep", "this computer slept", ""};
     case DisarmCause::earlier_stop:
-      return {"earlier stop", "stopped before this program began", clear_on_purpose};
+      return {"earlier stop", "an emergency stop came before this program began", clear_on_purpose};
     case DisarmCause::earlier_watchdog:
       return {"earlier watchdog",
               "a task of the board's firmware missed its deadline before this program began",
@@ -129,22 +132,22 @@ Words link_words(const LinkStatus& link) {
   }
   switch (link.state) {
     case HostLinkState::connecting:
-      return {"nothing was heard from the board yet",
-              "check that it is switched on and connected, and that the URL names it"};
+      return {"nothing was received from the board yet",
+              "check that the board is switched on and connected, and that the URL is correct"};
     case HostLinkState::lost:
-      return {"the board has fallen silent",
-              "check its power, cable and network; the link comes back by itself"};
+      return {"the board is silent",
+              "check the board's power, cable and network; the link then comes back automatically"};
     case HostLinkState::safe:
       return safe_words(link);
     case HostLinkState::active:
       break;
   }
   if (!link.in_control) {
-    return {"the board streams its state, but has confirmed no command of ours yet",
+    return {"the board streams its state, but has not confirmed a command of this program yet",
             "allow more time; `r4 bench` shows how many datagrams are lost"};
   }
   if (const auto cause = link.cause()) return {words_of(*cause).reason, words_of(*cause).fix};
-  return {"the board is active and takes our commands", ""};
+  return {"the board is active and accepts our commands", ""};
 }
 
 // In the functions below, `command` is null for a request that is not a command.
@@ -167,17 +170,18 @@ Words refusal_words(const Command* command, Refusal code, const LinkStatus& link
     case Refusal::format:
     case Refusal::range:
     case Refusal::channel:
-      words.fix = "see with r4 monitor what has changed on the board, then try again";
+      words.fix = "check the board with r4 monitor, then try again";
       if (command != nullptr) words.fix = bad_command(*command, code).fix;
       // An invalid key is never sent, so RANGE means that the board has no room for the key.
       if (code == Refusal::range && sets("key", command)) {
-        words.reason = fmt::format("refused by the board: RANGE (it holds {} keys)", max_keys);
-        words.fix = "take one away: C:key,id:off";
+        words.reason =
+            fmt::format("refused by the board: RANGE (it holds at most {} keys)", max_keys);
+        words.fix = "remove a key: C:key,id:off";
       }
       if (code == Refusal::range && (sets("timeout", command) || sets("heartbeat", command))) {
         words.fix =
-            "the board's heartbeat interval must stay below its timeout: set both in one step, "
-            "r4 send URL C:timeout,MS C:heartbeat,MS or link_timing()";
+            "keep the board's heartbeat interval below its timeout, and set both in one step: r4 "
+            "send URL C:timeout,MS C:heartbeat,MS or link_timing()";
       }
       break;
     case Refusal::safe:
@@ -186,24 +190,24 @@ Words refusal_words(const Command* command, Refusal code, const LinkStatus& link
         words.reason = fmt::format("refused by the board: SAFE ({})", why.reason);
         words.fix = why.fix;
       } else {
-        words.fix = "look at the board's SAFE field for the reason";
+        words.fix = "find the reason in the board's SAFE field";
       }
       break;
     case Refusal::busy:
       words.fix = words_of(LinkCause::busy).fix;
       break;
     case Refusal::stale:
-      words.fix = is(CommandKind::clear, command)
-                      ? "a stop or fault may have come since: look at the robot, then send it again"
-                      : "send it again if it is still wanted";
+      words.fix = is(CommandKind::clear, command) ? "check the robot, because a stop or fault may "
+                                                    "have come since; then send the command again"
+                                                  : "send the command again if you still need it";
       break;
     case Refusal::auth:
       words.fix = is(CommandKind::setting, command) && is_site_setting(command->text)
-                      ? "send it over USB: serial:auto"
+                      ? "send the command over USB: serial:auto"
                       : words_of(LinkCause::key_needed).fix;
       break;
     case Refusal::full:
-      words.fix = "send it again when the transfer that is under way has ended";
+      words.fix = "send the command again when the present transfer has ended";
       break;
     case Refusal::none:
     case Refusal::duplicate:
@@ -255,15 +259,16 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
       break;
     case Outcome::timed_out: {
       if (result.at == 0 && result.executed != 0) {  // a transfer, not a group
-        return {"was begun, and its end was not heard in time",
-                "give it more time, or look at the field I2CX"};
+        return {"the transfer has begun, and its end was not reported in time",
+                "give the transfer more time, or check the field I2CX"};
       }
       const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(result.elapsed).count();
       words.reason = fmt::format("not confirmed within {} ms", ms);
       if (link.state == HostLinkState::active && link.causes.without(harmless).empty()) {
-        words.reason += "; it may have been executed or not";
+        words.reason += "; the command may or may not have been executed";
         words.fix =
-            "allow more time, or send it again; `r4 bench` shows how many datagrams are lost";
+            "allow more time, or send the command again; `r4 bench` shows how many datagrams are "
+            "lost";
       } else {
         Words why = link_words(link);
         words.reason += ": " + why.reason;
@@ -273,22 +278,22 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
     }
     case Outcome::cancelled:
       words.reason =
-          "cancelled: a stop came, the board has a newer reason to be safe or another clock, "
-          "or the program gave it up";
-      words.fix = "see why, before the board is cleared or asked again";
+          "cancelled: by a stop, by a newer reason to be safe, by a restart of the board, or by "
+          "the program";
+      words.fix = "find the cause before you clear the board or repeat the command";
       break;
     case Outcome::closed:
       words.reason = "given up: the board was closed";
-      words.fix = "open it again";
+      words.fix = "open the board again";
       break;
     case Outcome::blocked:
       words.reason = "not confirmed: the board's thread does not answer";
-      words.fix = "a transport of your own must return at once";
+      words.fix = "let the functions of your own transport return at once";
       break;
     case Outcome::full:
       words.reason =
           fmt::format("not sent: {} commands are under way already", Session::max_pending);
-      words.fix = "wait until some of them are confirmed";
+      words.fix = "wait until some commands are confirmed";
       break;
     case Outcome::not_armed: {
       if (result.disarmed == DisarmCause::earlier_fault && is_of_wiring(link)) {
@@ -308,8 +313,8 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
 std::string group_words(std::size_t size, const CommandResult& result) {
   if (size == 1) return "";
   if (result.executed != 0) {
-    return fmt::format("; it is command {} of {}, and those before it were executed", result.at,
-                       size);
+    return fmt::format("; it is command {} of {}, and the commands before it were executed",
+                       result.at, size);
   }
   if (result.outcome != Outcome::refused && result.outcome != Outcome::not_armed) return "";
   return fmt::format("; none of the {} commands was executed", size);
@@ -360,10 +365,10 @@ Problem explain(const std::vector<PathStatus>& paths) {
     if (unnamed && path.state != PathState::other_board) continue;
     names += (names.empty() ? "" : ", ") + path.name;
     boards += (boards.empty() ? "" : ", ") + path.name + " to " +
-              (unnamed ? "one with another clock" : path.board_id);
+              (unnamed ? "a board with another clock" : path.board_id);
   }
-  return {ErrorKind::refused, std::move(names), "they lead to two boards: " + boards,
-          "give the URLs of one board, or open each board by itself"};
+  return {ErrorKind::refused, std::move(names), "the paths lead to two boards: " + boards,
+          "give the URLs of one board, or open each board alone"};
 }
 
 Problem explain(const Command& command, const CommandResult& result, const LinkStatus& link) {

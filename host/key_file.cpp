@@ -15,16 +15,15 @@
 namespace r4 {
 namespace {
 
-constexpr const char* new_one = "make one: r4 key new FILE";
+constexpr const char* new_one = "make a key: r4 key new FILE";
 
 Error cannot_be_read(const std::string& path, int error) {
   const bool denied = error == EACCES || error == EPERM;
   std::string fix = new_one;
   if (denied) {
-    fix = "run this as the user whose key it is, or make one of your own: r4 key new FILE";
+    fix = "run this as the owner of the key, or make your own key: r4 key new FILE";
   } else if (path.starts_with("~/")) {
-    fix =
-        "a ~ is only known to the shell: write $HOME" + path.substr(1) + " there, or a whole path";
+    fix = "write $HOME" + path.substr(1) + " or the full path, because only the shell replaces ~";
   }
   return {denied ? ErrorKind::permission : ErrorKind::open, path, std::strerror(error), fix};
 }
@@ -48,22 +47,23 @@ Key load_key(const std::string& path) {
   struct stat status {};
   if (!file || ::fstat(file.get(), &status) != 0) throw cannot_be_read(path, errno);
   if (S_ISDIR(status.st_mode)) {
-    throw Error(ErrorKind::open, path, "is a directory", "name the file that holds the key");
+    throw Error(ErrorKind::open, path, "is a directory", "give the file that holds the key");
   }
   // A group may read a file of root, as with systemd's credentials of a service.
   const mode_t allowed = status.st_uid == 0 ? S_IRWXU | S_IRGRP : S_IRWXU;
   if ((status.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO) & ~allowed) != 0) {
-    throw Error(ErrorKind::permission, path, "others can read or write this key",
-                "chmod 600 " + path + "; if somebody may have read it, make a new one");
+    throw Error(ErrorKind::permission, path, "other users can read or write this key",
+                "chmod 600 " + path + "; if another user may have read the key, make a new key");
   }
   std::string text = contents(file, path);
   text.erase(text.find_last_not_of("\r\n") + 1);
   Key key;
   if (parse_key(Text(text), key) != Refusal::none) {
     throw Error(
-        ErrorKind::data, path, "holds no key",
-        fmt::format("a key is one line, an id of 1 to {}, a colon and {} hexadecimal digits; {}",
-                    max_key_id, 2 * key_size, new_one));
+        ErrorKind::data, path, "does not hold a key",
+        fmt::format(
+            "give a file of one line: an id of 1 to {}, a colon and {} hexadecimal digits; or {}",
+            max_key_id, 2 * key_size, new_one));
   }
   return key;
 }

@@ -25,13 +25,14 @@ Registry with_all() {
   registry.add({{"sim", "sim:[?node=1]", "a simulated board in this process"},
                 [](asio::io_context& io, const Url& url, Role role, const Claim&) {
                   if (role == Role::board) {
-                    throw Error(ErrorKind::usage, url.text(), "sim: is a board, it cannot listen",
+                    throw Error(ErrorKind::usage, url.text(),
+                                "sim: is itself a board, so it cannot listen",
                                 "give the board a transport to listen on, such as udp://:2018");
                   }
                   return sim::make_sim_carrier(io, url);
                 }});
   registry.add(
-      {{"replay", "replay:FILE[?speed=1&path=1&from=0]", "what a board said in a recording"},
+      {{"replay", "replay:FILE[?speed=1&path=1&from=0]", "the datagrams of a board in a recording"},
        [](asio::io_context& io, const Url& url, Role role, const Claim&) {
          return make_replay_carrier(io, url, role);
        }});
@@ -77,7 +78,7 @@ std::vector<TransportHelp> transports() {
 void require_paths(std::size_t count) {
   if (count >= 1 && count <= Session::most_paths) return;
   throw Error(ErrorKind::usage, std::to_string(count) + " paths to one board",
-              "one to " + std::to_string(Session::most_paths) + " are possible",
+              "one to " + std::to_string(Session::most_paths) + " paths are possible",
               "give the URLs of one board, at most " + std::to_string(Session::most_paths));
 }
 
@@ -99,8 +100,8 @@ std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
         make_host_carrier(io, udp && has_host_port ? with_own_port(url) : url, role));
     has_host_port = has_host_port || udp;
     if (all.size() > 1 && (scheme == "sim" || scheme == "replay")) {
-      throw Error(ErrorKind::usage, url, "it is a board of its own, not a path to another",
-                  "open it alone");
+      throw Error(ErrorKind::usage, url, "this is a separate board, not a path to another board",
+                  "open this URL alone");
     }
     paths.push_back(path_of(url));
     if (std::count(paths.begin(), paths.end(), paths.back()) > 1) {

@@ -70,9 +70,9 @@ class States::Queue {
     }
     if (gap_ == 0) return std::nullopt;
     throw Error(ErrorKind::data, "states()",
-                fmt::format("{} waited, and there was no room for the next {}", most_,
-                            std::exchange(gap_, 0)),
-                "take them faster, or let more wait: StatesOptions::most");
+                fmt::format("the queue of {} states was full, so the next {} states are lost",
+                            most_, std::exchange(gap_, 0)),
+                "take the states faster, or enlarge the queue: StatesOptions::most");
   }
   bool ended() const {
     const std::lock_guard lock(mutex_);

@@ -90,10 +90,10 @@ const char* to_text(Outcome outcome) {
 Problem problem_of(const std::string& thing, const std::system_error& error) {
   if (auto problem = out_of_resources(thing, error.code().value())) return *std::move(problem);
   if (error.code().value() == EAGAIN) {
-    return {ErrorKind::open, thing, "this user may have no more threads",
-            "end some programs, or allow more: ulimit -u shows how many"};
+    return {ErrorKind::open, thing, "this user has reached the limit of threads",
+            "end some programs, or raise the limit, which ulimit -u shows"};
   }
-  return {ErrorKind::open, thing, "the system refuses it: " + error.code().message(),
+  return {ErrorKind::open, thing, "the system refused: " + error.code().message(),
           "end some programs, and try again"};
 }
 

@@ -45,25 +45,25 @@ class FileDescriptor {
 // The problem if `error` (errno) means that files, memory or epoll watches are used up.
 inline std::optional<Problem> out_of_resources(const std::string& thing, int error) {
   if (error == ENFILE) {
-    return Problem{ErrorKind::open, thing, "this computer has no file left", "end some programs"};
+    return Problem{ErrorKind::open, thing, "this computer has reached its limit of open files",
+                   "end some programs"};
   }
   if (error == ENOMEM || error == ENOBUFS) {
-    return Problem{ErrorKind::open, thing, "this computer has no memory left for it",
+    return Problem{ErrorKind::open, thing, "this computer does not have enough free memory",
                    "end some programs"};
   }
   if (error == ENOSPC) {  // from epoll_ctl(2)
-    return Problem{ErrorKind::open, thing,
-                   "the programs of this user wait for as many files and sockets as they may",
-                   "end some programs, or allow more: sysctl fs.epoll.max_user_watches shows how "
-                   "many"};
+    return Problem{
+        ErrorKind::open, thing, "this user has reached the limit of epoll watches",
+        "end some programs, or raise the limit, which sysctl fs.epoll.max_user_watches shows"};
   }
   if (error != EMFILE) return std::nullopt;
   rlimit limit{};
   ::getrlimit(RLIMIT_NOFILE, &limit);
   return Problem{
       ErrorKind::open, thing,
-      "this program may have " + std::to_string(limit.rlim_cur) + " files open, and has them",
-      "open fewer boards, or allow it more before it begins: ulimit -n " +
+      "this program has reached its limit of " + std::to_string(limit.rlim_cur) + " open files",
+      "open fewer boards, or raise the limit before you start the program: ulimit -n " +
           std::to_string(4 * limit.rlim_cur)};
 }
 

@@ -42,11 +42,11 @@ ShareGroup take_share_group(Url& url) {
   const std::optional<gid_t> id = id_of(*name);
   if (!id) {
     throw Error(ErrorKind::usage, url.text(), "there is no group '" + *name + "' on this machine",
-                "share it with one that is there (getent group), or make it: groupadd NAME");
+                "name an existing group (getent group lists them), or create one: groupadd NAME");
   }
   if (!is_ours(*id)) {
     throw Error(ErrorKind::permission, url.text(), "this user is not in the group " + *name,
-                "have it added (usermod -aG " + *name + " USER), and log in again");
+                "add the user to the group (usermod -aG " + *name + " USER), and log in again");
   }
   return {*name, *id};
 }

@@ -11,7 +11,7 @@
 namespace r4 {
 namespace {
 
-constexpr char example[] = "write it as in udp://192.168.1.77 or serial:///dev/ttyACM0";
+constexpr char example[] = "write a URL such as udp://192.168.1.77 or serial:///dev/ttyACM0";
 
 [[noreturn]] void refuse(std::string_view url, std::string reason, std::string fix = example) {
   throw Error(ErrorKind::usage, std::string(url), std::move(reason), std::move(fix));
@@ -49,7 +49,7 @@ std::string decode_percent(std::string_view url, std::string_view text) {
 std::uint16_t parse_port(std::string_view url, std::string_view text) {
   std::uint32_t port = 0;
   if (!parse_number(text, port) || port > 65535) {
-    refuse(url, "'" + std::string(text) + "' is not a port", "a port is a number from 0 to 65535");
+    refuse(url, "'" + std::string(text) + "' is not a port", "give a number from 0 to 65535");
   }
   return static_cast<std::uint16_t>(port);
 }
@@ -68,16 +68,16 @@ std::string parse_host(std::string_view url, std::string_view host, bool bracket
 }  // namespace
 
 Url Url::parse(std::string_view text) {
-  if (printable(text) != text) refuse(text, "it has control characters in it");
+  if (printable(text) != text) refuse(text, "the URL contains control characters");
   const std::size_t colon = text.find(':');
   std::string_view scheme = text.substr(0, colon);
   const auto in_scheme = [](char c) { return is_letter(c) || is_digit(c); };
   if (colon == std::string_view::npos || scheme.empty() || !is_letter(scheme.front()) ||
       !std::all_of(scheme.begin(), scheme.end(), in_scheme)) {
     if (text.starts_with("/dev/")) {
-      refuse(text, "it is a device, not a URL", "write serial://" + std::string(text));
+      refuse(text, "this is a device, not a URL", "write serial://" + std::string(text));
     }
-    refuse(text.empty() ? "''" : text, "it does not begin with a transport and a colon");
+    refuse(text.empty() ? "''" : text, "the URL does not begin with a transport and a colon");
   }
 
   Url url;
@@ -118,7 +118,7 @@ Url Url::parse(std::string_view text) {
     }
     const std::string key(pair.substr(0, equals));
     if (!url.query_.emplace(key, decode_percent(text, pair.substr(equals + 1))).second) {
-      refuse(text, "'" + key + "' is there twice", "give it once");
+      refuse(text, "'" + key + "' is given twice", "give it once");
     }
     query = after;
   }

@@ -23,7 +23,7 @@ namespace {
 [[noreturn]] void refuse_as_too_many(std::string_view pattern) {
   throw Error(ErrorKind::usage, std::string(pattern),
               "stands for more than " + std::to_string(most_pattern_urls) + " boards",
-              "name fewer in one URL");
+              "name fewer boards in one URL");
 }
 
 bool is_decimal(char c) { return c >= '0' && c <= '9'; }
@@ -98,7 +98,7 @@ std::vector<PatternUrl> expand_path(std::string_view pattern) {
     const std::size_t close = rest.find('}');
     if (open == std::string_view::npos && close == std::string_view::npos) break;
     if (open == std::string_view::npos || close == std::string_view::npos || close < open) {
-      refuse_pattern(pattern, "has a brace without the other one");
+      refuse_pattern(pattern, "has a brace without its partner");
     }
     const std::vector<std::string> numbers =
         numbers_of(pattern, rest.substr(open + 1, close - open - 1));
@@ -133,7 +133,7 @@ std::vector<PatternUrl> expand_urls(std::string_view pattern) {
     }
     if (urls.size() != boards.size()) {
       throw Error(ErrorKind::usage, std::string(pattern),
-                  "its paths lead to " + std::to_string(boards.size()) + " and to " +
+                  "the paths lead to " + std::to_string(boards.size()) + " and to " +
                       std::to_string(urls.size()) + " boards",
                   "give each path a range of the same length, as in "
                   "can://can0?node=0-7+can://can1?node=0-7");
@@ -149,7 +149,7 @@ std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns) {
   for (const std::string& pattern : patterns) {
     for (PatternUrl& each : expand_urls(pattern)) {
       if (!seen.insert(each.url).second) {
-        throw Error(ErrorKind::usage, each.url, "it is named twice", "name it once");
+        throw Error(ErrorKind::usage, each.url, "the board is named twice", "name each board once");
       }
       boards.push_back(std::move(each));
     }

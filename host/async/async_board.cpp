@@ -155,7 +155,7 @@ void AsyncBoard::start_transfer(const Command& command, Duration timeout,
                                 CompletionPtr completion) {
   if (command.kind != CommandKind::i2c_read && command.kind != CommandKind::i2c_write &&
       command.kind != CommandKind::i2c_scan) {
-    throw Error(ErrorKind::usage, shown(command), "is not a transfer on the I2C bus",
+    throw Error(ErrorKind::usage, shown(command), "is not a valid transfer on the I2C bus",
                 "send it with send() or async_send()");
   }
   (new TransferSteps(*impl_, bounded(timeout), std::move(completion)))
@@ -189,13 +189,13 @@ BoardRole AsyncBoard::role() const { return impl_->role; }
 void AsyncBoard::require_role_settled(std::string_view what) const {
   if (!impl_->is_open() || !impl_->session.leaving()) return;
   throw Error(ErrorKind::usage, std::string(what), "control is being released",
-              "wait until that has ended");
+              "wait until the release has ended");
 }
 
 void AsyncBoard::take_control() {
   if (!impl_->is_open()) {
     throw Error(ErrorKind::usage, "take_control()", "the board is not open",
-                "call it between open() and close()");
+                "call this function between open() and close()");
   }
   require_role_settled("take_control()");
   if (role() != BoardRole::control) impl_->become(BoardRole::control);

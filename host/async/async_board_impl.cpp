@@ -52,11 +52,11 @@ void AsyncBoard::Impl::end_entry(Time late) {
     poll_wanted = true;
     const Inside warning(depth);
     const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(late).count();
-    warn(
-        {ErrorKind::refused, "the event loop",
-         "it stood still: datagrams, also heartbeats, were sent " + std::to_string(ms) + " ms late",
-         "handlers on this loop must return at once; if none is slow, the "
-         "computer had no time for this program"});
+    warn({ErrorKind::refused, "the event loop",
+          "the loop did not run: datagrams, including heartbeats, were sent " + std::to_string(ms) +
+              " ms late",
+          "let the handlers on this loop return at once; if the handlers are fast, give this "
+          "program more processor time"});
   }
   const Inside inside(depth);
   for (;;) {
@@ -126,8 +126,8 @@ void AsyncBoard::Impl::cancel(Ticket id) {
 
 void AsyncBoard::Impl::open() {
   if (phase != Phase::made) {
-    throw Error(ErrorKind::usage, paths.name(), "a board is opened once",
-                "make another one for the same URL");
+    throw Error(ErrorKind::usage, paths.name(), "a board can be opened only once",
+                "make a new AsyncBoard for the same URL");
   }
   std::size_t opened = 0;
   for (const auto& path : paths) {

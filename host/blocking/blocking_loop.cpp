@@ -67,11 +67,13 @@ void BlockingLoop::run(const CallPtr& call, Duration timeout) {
   if (done) return;
   call->abandoned = true;
   if (call->stop) {
-    throw blocked_error(call->text, "not confirmed; it goes out when it can", stop_last_resort);
+    throw blocked_error(call->text, "not confirmed; the stop is sent as soon as possible",
+                        stop_last_resort);
   }
-  throw blocked_error(call->text,
-                      call->begun ? "not confirmed, it may have been executed or not" : "not sent",
-                      name_.fix);
+  throw blocked_error(
+      call->text,
+      call->begun ? "not confirmed, the command may or may not have been executed" : "not sent",
+      name_.fix);
 }
 
 void BlockingLoop::run_unawaited(const CallPtr& call) {

@@ -22,18 +22,18 @@ struct Bridge::Impl {
   Impl(std::string_view hosts, std::string_view board, BridgeOptions options)
       : on_event(std::move(options.on_event)) {
     if (options.timeout <= std::chrono::milliseconds(0)) {
-      throw Error(ErrorKind::usage, "a bridge's timeout", "it must be more than 0",
-                  "give the board's, which is 1000 ms where nobody has set another");
+      throw Error(ErrorKind::usage, "a bridge's timeout", "the timeout must be longer than 0 ms",
+                  "give the board's timeout, which is 1000 ms by default");
     }
     if (options.keys.size() > max_keys) {
       throw Error(ErrorKind::usage, "a bridge's keys",
                   "there are " + std::to_string(options.keys.size()) +
-                      ", and a board has at most " + std::to_string(max_keys),
-                  "give those of the board");
+                      " keys, and a board has at most " + std::to_string(max_keys),
+                  "give the keys of the board");
     }
     if (options.open && !options.keys.empty()) {
-      throw Error(ErrorKind::usage, "a bridge that is open to everyone", "it has a key, too",
-                  "choose one: the key (--key, or R4_KEY), or --open");
+      throw Error(ErrorKind::usage, "a bridge that is open to everyone",
+                  "the bridge also has a key", "choose one: the key (--key, or R4_KEY), or --open");
     }
     for (const BridgedUrls& urls : pair_urls(hosts, board)) {
       const std::string scheme = Url::parse(urls.hosts).scheme();
@@ -60,15 +60,15 @@ struct Bridge::Impl {
 
   // Throws unless a bridge without a key may serve these hosts. An open bridge causes a warning.
   void permit(const BridgedUrls& urls, bool open) {
-    const std::string danger = "everyone who reaches it may drive the board at " + urls.board +
-                               ", which asks for no key at its cable";
+    const std::string danger = "every program that reaches the bridge may drive the board at " +
+                               urls.board + ", which does not need a key at its cable";
     if (!open && !is_of_this_computer(urls.hosts)) {
       throw Error(ErrorKind::usage, urls.hosts, danger,
-                  "give the bridge the board's key (--key FILE), or listen at udp://127.0.0.1; "
-                  "--open allows it to everyone");
+                  "give the bridge the board's key (--key FILE), or listen at udp://127.0.0.1; or "
+                  "allow every program with --open");
     }
     if (!open || !on_event) return;
-    const Problem warning{ErrorKind::usage, urls.hosts, "it is open: " + danger,
+    const Problem warning{ErrorKind::usage, urls.hosts, "the bridge is open: " + danger,
                           "give the bridge the board's key instead: --key FILE"};
     on_event({pairs.size(), BridgeSide::hosts, {CarrierEvent::Kind::warning, warning}});
   }

@@ -35,13 +35,13 @@ void require_two_ports(const Url& hosts, const Url& board) {
   const UdpUrl b(board, Role::host);
   if (a.port == 0) return;
   if (!b.search && b.port == a.port && is_ours(b.host)) {
-    throw Error(ErrorKind::usage, b.text, "that is where the bridge itself listens for hosts",
+    throw Error(ErrorKind::usage, b.text, "the bridge itself listens for hosts at this address",
                 other_side);
   }
   if (b.listen == a.port) {
     throw Error(ErrorKind::usage, b.text,
-                "it hears the board at the port where the other side listens for hosts",
-                "use ?listen=0 to hear the board on any free port");
+                "both sides would use the same port: one for the board, one for hosts",
+                "use ?listen=0 to receive from the board on any free port");
   }
 }
 
@@ -64,21 +64,21 @@ void require_two_sides(const Url& hosts, const Url& board) {
 
 void require_board(const Url& board) {
   if (board.scheme() == "replay") {
-    throw Error(ErrorKind::usage, board.text(), "a recording cannot be driven",
-                "r4 replay plays it to programs");
+    throw Error(ErrorKind::usage, board.text(), "a recording is not a board that can be driven",
+                "play the recording to programs with r4 replay");
   }
   if (board.scheme() == "pty") {
     throw Error(ErrorKind::usage, board.text(),
-                "pty: is for the side of hosts, which open its other end",
-                "open a board at serial:///dev/NAME");
+                "pty: is only for the side of the hosts, which open the other end",
+                "give the board's URL as serial:///dev/NAME");
   }
 }
 
 void require_one_path(std::string_view side) {
   if (split_paths(side).size() == 1) return;
   throw Error(ErrorKind::usage, std::string(side),
-              "a side of a bridge is one path, and these are several",
-              "begin a bridge for each path of the board; its host joins them, as in "
+              "this gives several paths, and each side of a bridge has one path",
+              "start a bridge for each path of the board, and join the paths at the host, as in "
               "udp://ROBOT:2018+udp://ROBOT:2019");
 }
 
@@ -99,9 +99,9 @@ std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view boar
   std::vector<PatternUrl> b = expand_urls(std::vector{std::string(board)});
   if (a.size() != b.size()) {
     throw Error(ErrorKind::usage, std::string(hosts) + " " + std::string(board),
-                "they stand for " + std::to_string(a.size()) + " and " + std::to_string(b.size()) +
-                    " transports",
-                "each board needs one of its own on both sides, as in udp://0.0.0.0:2100-2107 "
+                "the two sides give " + std::to_string(a.size()) + " and " +
+                    std::to_string(b.size()) + " transports",
+                "give each board one transport on each side, as in udp://0.0.0.0:2100-2107 "
                 "'can://can0?node=0-7'");
   }
   std::vector<BridgedUrls> pairs;

@@ -342,16 +342,16 @@ void BridgedPair::report_trouble() {
     case BridgeGuard::Trouble::none:
       return;
     case BridgeGuard::Trouble::board_has_no_key:
-      problem.reason = "the board has no key, and this bridge passes only what is signed for it";
+      problem.reason = "the board has no key, and this bridge passes only signed datagrams";
       problem.fix =
-          "give the board the key while no bridge has its cable (r4 key give FILE URL), or begin "
-          "the bridge without --key";
+          "end the bridge and give the board the key over its cable (r4 key give FILE URL), or "
+          "start the bridge without --key";
       break;
     case BridgeGuard::Trouble::key_needed:
       problem.reason =
-          "the board has a key, and this bridge, which has none, cannot tell what is signed with "
-          "it: nothing but stops and questions passes";
-      problem.fix = "give the bridge the key, too: r4 bridge … --key FILE";
+          "the board has a key, but this bridge does not have the key, so it cannot check "
+          "signatures and passes only stops and questions";
+      problem.fix = "give the bridge the key: r4 bridge … --key FILE";
       break;
   }
   on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});

@@ -58,23 +58,23 @@ std::string_view meaning_of(Refusal refusal) {
     case Refusal::none:
       return "not refused";
     case Refusal::unknown:
-      return "the board knows no such command, field or setting";
+      return "the board does not know this command, field or setting";
     case Refusal::format:
-      return "not the form of this command";
+      return "the text does not have the form of this command";
     case Refusal::range:
       return "a value is outside its range";
     case Refusal::channel:
-      return "no such channel";
+      return "the channel does not exist";
     case Refusal::stale:
-      return "overtaken by newer commands or delayed too long";
+      return "the command is older than an executed one, or was delayed too long";
     case Refusal::duplicate:
-      return "executed before";
+      return "the command was executed before";
     case Refusal::safe:
       return "the board is in its safe state";
     case Refusal::busy:
       return "another host controls the board";
     case Refusal::auth:
-      return "not signed with the board's key, or only to be set over USB";
+      return "the command is not signed with the board's key, or is accepted over USB only";
     case Refusal::full:
       return "another transfer is under way";
   }
@@ -88,8 +88,8 @@ Problem bad_command(std::string_view text, Refusal refusal) {
   } else if (const std::string forms = forms_like(text); !forms.empty()) {
     problem.fix = "use " + forms;
   } else {
-    problem.reason = "no such command";
-    problem.fix = "the commands are";
+    problem.reason = "this is not a command";
+    problem.fix = "use one of";
     for (const CommandHelp& each : all_command_help()) problem.fix += " " + each.form;
   }
   return problem;
@@ -106,11 +106,11 @@ Problem failed_transfer(std::string_view command, I2cOutcome outcome) {
   Problem problem{ErrorKind::refused, std::string(command), to_text(outcome), ""};
   switch (outcome) {
     case I2cOutcome::no_acknowledge:
-      problem.fix = "X:SCAN shows which addresses answer; look at supply, wires and pull-ups";
+      problem.fix = "send X:SCAN to see which addresses answer; check supply, wires and pull-ups";
       break;
     case I2cOutcome::bus_stuck:
       problem.fix =
-          "a device holds SDA or SCL of the user's bus: look at its supply, or take it off";
+          "find the device that holds SDA or SCL of the user's bus: check its supply, or remove it";
       break;
     default:
       problem.fix = "send it again when the board is ACTIVE";
@@ -124,9 +124,8 @@ void require_valid(const Command& command) {
     throw Error(bad_command(command, refusal));
   }
   if (command.kind == CommandKind::leave) {
-    throw Error(ErrorKind::usage, "E:LEAVE",
-                "a host says it when it ends, and sends nothing after it",
-                "close the board, or end the program that has it");
+    throw Error(ErrorKind::usage, "E:LEAVE", "a host sends this only when it ends its session",
+                "close the board, or end the program that controls it");
   }
   if (command.kind != CommandKind::fields && command.kind != CommandKind::setting) return;
   std::array<char, max_datagram - DatagramWriter::trailer_max - signature_max> buffer;
@@ -134,14 +133,14 @@ void require_valid(const Command& command) {
   write_command(writer, command);
   if (!writer.ok()) {
     throw Error(ErrorKind::usage, command.kind == CommandKind::fields ? "F" : "C",
-                "its text is too long for one datagram, or has bytes that a datagram cannot hold",
+                "the text is too long for one datagram, or has bytes that a datagram cannot hold",
                 "use printable ASCII without ; and ^, at most 900 characters");
   }
 }
 
 void require_any(const Setpoints& group) {
   if (!group.empty()) return;
-  throw Error(ErrorKind::usage, "the group", "has no command", "add one: Setpoints::add()");
+  throw Error(ErrorKind::usage, "the group", "has no command", "add a command: Setpoints::add()");
 }
 
 void require_cable(std::string_view url, std::string_view secret) {
@@ -149,9 +148,11 @@ void require_cable(std::string_view url, std::string_view secret) {
     const bool own =
         path.starts_with("serial:") || path.starts_with("sim:") || path.starts_with("memory:");
     if (own) continue;
-    throw Error(ErrorKind::usage, std::string(secret),
-                fmt::format("a board takes it over USB only, and at {} others would see it", path),
-                "use serial:auto");
+    throw Error(
+        ErrorKind::usage, std::string(secret),
+        fmt::format("a board accepts this over USB only, and at {} other programs could read it",
+                    path),
+        "use serial:auto");
   }
 }
 

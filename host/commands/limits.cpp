@@ -38,13 +38,13 @@ void require_valid(const SessionOptions& options) {
   }
   require("command_retry", options.command_retry.count(), 1, minute_ms);
   require("stop_retry", options.stop_retry.count(), 1, 1000);
-  require("identify_interval", options.identify_interval.count(), 1, hour_ms, "0 turns it off");
+  require("identify_interval", options.identify_interval.count(), 1, hour_ms, "0 turns this off");
 }
 
 void require_control(BoardRole role, std::string_view what) {
   if (role == BoardRole::control) return;
   throw Error(ErrorKind::usage, std::string(what), "this program only watches the board",
-              "take_control() first, or open the board with BoardRole::control");
+              "call take_control() first, or open the board with BoardRole::control");
 }
 
 void require_control(BoardRole role, const Command& command) {
@@ -69,7 +69,8 @@ void require_timeout(std::string_view what, std::chrono::milliseconds timeout) {
 void require_wait(std::string_view what, std::chrono::milliseconds timeout) {
   if (timeout.count() >= 0) return;
   throw Error(ErrorKind::usage, fmt::format("{} within {} ms", what, timeout.count()),
-              "the timeout must not be negative", "give a timeout; 0 looks without waiting");
+              "the timeout must not be negative",
+              "give a timeout of at least 0 ms; 0 returns at once");
 }
 
 void require_link_timing(std::chrono::milliseconds timeout, std::chrono::milliseconds heartbeat,
@@ -85,19 +86,19 @@ void require_link_timing(std::chrono::milliseconds timeout, std::chrono::millise
   if (timeout < 2 * ours) {
     throw Error(
         ErrorKind::usage, thing,
-        fmt::format("our own heartbeats come every {} ms only: the board would go safe again "
-                    "and again",
+        fmt::format("this program sends a heartbeat only every {} ms, so the board would go safe "
+                    "again and again",
                     ours.count()),
         fmt::format("set SessionOptions::timing.heartbeat_ms to {} first", timeout.count() / 3));
   }
 }
 
 void require_watchdog(std::chrono::milliseconds period) {
-  require("watchdog()", period.count(), 1, hour_ms, "0 turns it off");
+  require("watchdog()", period.count(), 1, hour_ms, "0 turns this off");
 }
 
 void require_callback_limit(std::chrono::milliseconds limit) {
-  require("callback_limit", limit.count(), 1, hour_ms, "0 turns it off");
+  require("callback_limit", limit.count(), 1, hour_ms, "0 turns this off");
 }
 
 }  // namespace r4

@@ -38,7 +38,7 @@ Microseconds ServoCalibration::pulse(Degrees angle) const {
   if (is_in_range(angle)) return Microseconds(static_cast<std::int32_t>(nearest_us(angle)));
   const auto [least, most] = std::minmax(one_.angle.value, other_.angle.value);
   throw Error(ErrorKind::usage, fmt::format("{} degrees", angle.value),
-              "the angle is outside of the servo's calibration",
+              "the angle is outside the servo's calibration",
               fmt::format("give {} to {}", least, most));
 }
 

@@ -17,13 +17,13 @@ Problem bad_group_member(const Command& command, std::size_t others) {
     problem.reason =
         std::string(drives_output(command.kind) ? "is a transfer of its own" : "drives no output") +
         ", so it cannot be part of a group";
-    problem.fix = "send it by itself; a group is made of O D S R P B Z and X:DAC";
+    problem.fix = "send the command alone; a group may contain O D S R P B Z and X:DAC";
   } else if (others == max_group) {
-    problem.reason = fmt::format("is one more than the {} that a group may have", max_group);
+    problem.reason = fmt::format("is one command too many: a group has at most {}", max_group);
     problem.fix = "send a second group";
   } else {
-    problem.reason = "is the second command for the same channel in this group";
-    problem.fix = "leave one of them out";
+    problem.reason = "is the second command for its channel in this group";
+    problem.fix = "leave out one of the two commands";
   }
   return problem;
 }

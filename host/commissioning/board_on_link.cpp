@@ -34,8 +34,8 @@ std::optional<ReceivedState> BoardOnLink::next_state(Duration timeout) {
     const auto now = std::chrono::steady_clock::now();
     // Does not feed, because heartbeats could make the board restore its outputs.
     if (now - fed_ > supervision) {
-      throw Error(ErrorKind::refused, board_.name(),
-                  "this program stood still while something moved", "resume");
+      throw Error(ErrorKind::refused, board_.name(), "this program did not run during a movement",
+                  "resume");
     }
     fed_ = now;
     board_.feed();

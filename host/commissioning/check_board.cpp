@@ -27,8 +27,8 @@ void find_chip(Checking& c, std::uint8_t address) {
   const double seen =
       c.number(Topic::address_seen,
                fmt::format("{} does not answer at {:#04x}. The line `report` in a serial monitor "
-                           "lists the addresses that answer (docs/how-to/firmware.md). At which "
-                           "address does a chip answer that no other chip has? 0: at none.",
+                           "lists the addresses that answer (docs/how-to/firmware.md). Which "
+                           "address answers, but is not the address of another chip? 0: none.",
                            thing, address),
                "address");
   const auto at = static_cast<std::uint8_t>(std::lround(seen));
@@ -43,22 +43,22 @@ void check_identity(Checking& c, int) {
   const Report& report = c.report;
   if (report.board_id.empty()) {
     Checking::give_up(Status::unsupported,
-                      "the board does not say who it is: the paper's firmware");
+                      "the board does not report its identity: it runs the paper's firmware");
   }
   c.note(fmt::format("{}, firmware {}, {}", report.board_id, report.firmware, report.capabilities));
 }
 
 void check_settings(Checking& c, int) {
   if (c.report.wiring_source.empty()) {
-    Checking::give_up(Status::unsupported, "the wiring and the settings are given over USB only");
+    Checking::give_up(Status::unsupported, "the board accepts a wiring and settings over USB only");
   }
   if (c.report.wiring_source == to_text(WiringSource::damaged)) {
     return c.found(Finding::wiring_damaged);
   }
   if (c.report.wiring_source == to_text(WiringSource::plan)) {
-    return c.note("the board keeps no wiring of its own yet: the plan");
+    return c.note("the board has no stored wiring yet, so it uses the plan");
   }
-  c.say("Does the board keep its settings over a restart?");
+  c.say("This check shows whether the board keeps its settings over a restart.");
   const BoardWiring kept = c.wiring_after_restart();
   if (kept.source != WiringSource::given || kept.wiring != c.report.wiring) {
     c.found(Finding::not_kept);
@@ -108,7 +108,8 @@ void check_user_bus(Checking& c, int) {
 void check_uart(Checking& c, int channel) {
   const double baud = c.number(
       Topic::baud,
-      fmt::format("At how many baud does the device at UART {} send? 0: none is there.", channel),
+      fmt::format("At how many baud does the device at UART {} send? 0: no device is connected.",
+                  channel),
       "baud");
   if (baud < uart_min_baud || baud > uart_max_baud) {
     Checking::give_up(Status::skipped, "nothing is connected");

@@ -143,7 +143,7 @@ void check_supply(Checking& c, int input) {
           {Learnt::What::serves, Thing{SignalKind::analog, other}.signal(), thing.signal(), {}, 1});
     }
     if (shown < 0.1) return c.found(Finding::no_voltage);
-    c.found(Finding::divider_wrong, fmt::format("{:.2f} V in place of {:.2f} V", shown, meter));
+    c.found(Finding::divider_wrong, fmt::format("{:.2f} V instead of {:.2f} V", shown, meter));
   }
   if (meter > 0 && shown >= 0.1)
     c.learnt({Learnt::What::full_scale, thing.signal(), 0, {}, meter / shown});
@@ -154,10 +154,10 @@ void check_handle(Checking& c, int) {
   c.require(Topic::handle_held, "Hold the dead-man's handle, and confirm while you hold it.",
             "the handle was not held");
   const State held = states_until_now(c).back();
-  if (held.handle == Handle::none) return c.note("by its wiring the board has no handle");
+  if (held.handle == Handle::none) return c.note("the wiring of the board has no handle");
   c.board.forget_states();
-  c.require(Topic::handle_released, "Now let go of the handle, and confirm.",
-            "the handle was not let go");
+  c.require(Topic::handle_released, "Now release the handle, and confirm.",
+            "the handle was not released");
   const States releasing = states_until_now(c);
   const State& released = releasing.back();
   c.measured("AINDMH held", held.volts(Analog::aindmh), "V");
@@ -177,7 +177,7 @@ void check_encoder(Checking& c, int channel) {
   States states{c.collect(50ms).back()};
   c.board.forget_states();
   c.require(Topic::wheel_turned,
-            fmt::format("Turn the wheel of encoder {} forward by hand, one whole turn within some "
+            fmt::format("Turn the wheel of encoder {} forward by hand, one full turn within a few "
                         "seconds, and confirm.",
                         channel),
             "the wheel was not turned");
@@ -213,12 +213,11 @@ void check_encoder(Checking& c, int channel) {
 void check_ultrasonic(Checking& c, int channel) {
   constexpr Duration readings = 800ms;  // three readings of each sensor
   c.select_fields("US1,US2,US3,US4");
-  c.require(
-      Topic::hand_before_sensor,
-      fmt::format("Hold your hand still, about 20 cm before ultrasonic sensor {}, and confirm "
-                  "while you hold it.",
-                  channel),
-      "no hand was before the sensor");
+  c.require(Topic::hand_before_sensor,
+            fmt::format("Hold your hand still, about 20 cm in front of ultrasonic sensor {}, and "
+                        "confirm while the hand is there.",
+                        channel),
+            "a hand was not in front of the sensor");
   c.collect(300ms);  // time for one reading of each sensor
   c.board.forget_states();
   const States with_hand = c.collect(readings);

@@ -64,8 +64,8 @@ void check_silence(Checking& c, int) {
     rest = Command::osmc(motor, Pwm(0), Direction::reverse);
   }
   text +=
-      "Then this program falls silent: within about a second the board must switch everything "
-      "off by itself. Hold the key until then.";
+      "Then this program stops its heartbeats: within about a second the board must switch all "
+      "outputs off. Hold the key until then.";
   c.select_fields("ENC1,ENC2,ENC3,ENC4");
   ReceivedState began, last;
   bool by_itself = false;
@@ -94,11 +94,12 @@ void check_silence(Checking& c, int) {
   const ReceivedState later = c.collect(300ms).back();
   c.send(Command::clear());
   if (!by_itself)
-    Checking::give_up(Status::not_done, "the board was not safe before the key was let go");
+    Checking::give_up(Status::not_done, "the key was released before the board was safe");
   const auto safe_after_ms = static_cast<std::int32_t>(last.t_ms - began.t_ms);
   c.measured("silence to safe, by the board's clock", safe_after_ms, "ms");
   if (safe_after_ms > expected_ms) c.found(Finding::silence_too_long);
-  if (motor == 0) return c.note("no motor with an encoder had turned: relay 1 alone was closed");
+  if (motor == 0)
+    return c.note("a motor with an encoder has not turned yet, so only relay 1 was closed");
   const std::int32_t counts = later.encoder(motor) - at_rest.encoder(motor);
   c.measured(fmt::format("encoder {} in the safe state", motor), counts, "counts in 0.3 s");
   if (std::abs(counts) > 2) c.found(Finding::rolls_on);
@@ -134,7 +135,7 @@ void check_stop(Checking& c, int) {
       }
       if (!stopped_ms) c.found_at(transports[i], Finding::stop_too_slow);
     });
-    if (!held) Checking::give_up(Status::not_done, "the key was let go");
+    if (!held) Checking::give_up(Status::not_done, "the key was released");
     if (stopped_ms) c.measured(transports[i] + ": stop, to a state", *stopped_ms, "ms");
     c.send(Command::clear());
   }

@@ -50,7 +50,7 @@ void check_motor(Checking& c, Thing commanded, MakeCommand make) {
   c.select_fields("DEFAULT,ENC1,ENC2,ENC3,ENC4");
   EncoderTravel backward, forward;
   move(commanded, Direction::reverse, "BACKWARD", backward);
-  const auto seen = c.which(commanded, "Which motor has turned?");
+  const auto seen = c.which(commanded, "Which motor turned?");
   if (!seen) return c.found(Finding::does_not_move);
   if (c.confirms(Topic::forward, "Did it turn FORWARD? (It should have turned backward.)")) {
     const bool may_be_two_pwm = row_of(commanded.first).terminal == Terminal::drive_line &&
@@ -89,8 +89,8 @@ void check_motor_supply(Checking& c, int) {
   }
   const Command relay_1 = Command::relay(1, true);
   c.move(
-      "Relay 1 closes for two seconds (a click): the motor drivers have supply, and no motor "
-      "turns. Look at the meter.",
+      "Relay 1 closes for two seconds (a click): the motor drivers have supply, and the motors do "
+      "not turn. Look at the meter.",
       relay_1, std::nullopt, 2s);
   if (!c.confirms(Topic::supply_with_relay_closed,
                   "Did the meter show the motor supply while you held the key?")) {
@@ -106,7 +106,7 @@ void check_relay(Checking& c, int channel) {
                                     "second click).",
                                     channel),
          Command::relay(channel, true), rest, half_a_second);
-  if (!c.which({SignalKind::relay, channel}, "Which relay has clicked last?")) {
+  if (!c.which({SignalKind::relay, channel}, "Which relay clicked last?")) {
     c.found(Finding::relay_dead);
   }
 }
@@ -117,7 +117,7 @@ void check_servo(Checking& c, int channel) {
                      channel),
          Command::servo(channel, Microseconds(1500)), Command::servo(channel, Microseconds(0)),
          half_a_second);
-  if (c.which({SignalKind::servo, channel}, "Which servo has moved?")) return;
+  if (c.which({SignalKind::servo, channel}, "Which servo moved?")) return;
   const bool supplied = c.confirms(
       Topic::servo_supply,
       fmt::format("Does a meter show 5 V between the outer pins of the header of servo {}?",
@@ -142,7 +142,7 @@ void check_stepper(Checking& c, int channel) {
                      channel, steps),
          Command::stepper(channel, Steps(steps), StepsPerSecond(2 * steps)), Command::zero(channel),
          half_a_second);
-  const auto seen = c.which({SignalKind::step, channel}, "Which stepper has turned?");
+  const auto seen = c.which({SignalKind::step, channel}, "Which stepper turned?");
   if (!seen) return c.found(Finding::does_not_move);
   if (c.confirms(Topic::forward, "Did it turn FORWARD?")) return;
   c.found(Finding::reversed);

@@ -135,13 +135,12 @@ bool Checking::clear_cause(const LinkStatus& link) {
     return false;
   }
   require(Topic::clear,
-          unconfirmed
-              ? "Nobody has confirmed how this board is wired, so it keeps its outputs off. "
-                "A command may move something else than it names. May this program clear "
-                "the fault (E:CLEAR), for the time until the board's next start?"
-              : fmt::format("The board is in the safe state: {}. May this program clear it "
-                            "(E:CLEAR)?",
-                            to_text(link.reason)),
+          unconfirmed ? "The wiring of this board is not confirmed, so the board keeps its outputs "
+                        "off. A command may move another output than it names. May this program "
+                        "clear the fault (E:CLEAR) until the board's next start?"
+                      : fmt::format("The board is in the safe state: {}. May this program clear "
+                                    "the safe state (E:CLEAR)?",
+                                    to_text(link.reason)),
           "the safe state was not cleared");
   send(Command::clear());
   return true;
@@ -149,11 +148,11 @@ bool Checking::clear_cause(const LinkStatus& link) {
 
 void Checking::make_ready() {
   if (has_found(report, "handle")) {
-    give_up(Status::not_done, "nothing moves before the dead-man's handle is right");
+    give_up(Status::not_done, "the check needs a correct dead-man's handle");
   }
   if (check.section == Section::wheels_off_ground && check.id != supply &&
       has_found(report, supply)) {
-    give_up(Status::not_done, "no motor turns before the motor supply is right");
+    give_up(Status::not_done, "the check needs a correct motor supply");
   }
   for (int tries = 0;; ++tries) {
     board.wait_heard();
@@ -204,8 +203,8 @@ bool Checking::watch(ReceivedState& state) {
       return state.safe == SafeReason::none;
     }
   }
-  throw Error(ErrorKind::refused, check.id, "the board's states stopped while something moved",
-              "look at the link, and resume");
+  throw Error(ErrorKind::refused, check.id, "the board's states stopped during a movement",
+              "check the link, and resume");
 }
 
 void Checking::move(const std::string& text, const Command& command,
@@ -229,7 +228,7 @@ void Checking::move(const std::string& text, const Command& command,
     if (moved >= most) return;
     say("That was too short to see: hold the key until the movement has ended.");
   }
-  give_up(Status::not_done, "the movement was cut short each time");
+  give_up(Status::not_done, "each attempt ended before the movement was complete");
 }
 
 void Checking::measured(std::string what, double value, std::string unit) {
@@ -246,7 +245,7 @@ void Checking::found_at(std::string thing, Finding finding, std::string detail) 
 
 void Checking::learnt_exchange(Thing places_of, Thing served) {
   const std::string first = name_of(places_of);
-  found(Finding::exchanged, (first == check.id ? name_of(served) : first) + " in its place");
+  found(Finding::exchanged, (first == check.id ? name_of(served) : first) + " instead");
   learnt({Learnt::What::serves, places_of.signal(), served.signal(), {}, 1});
 }
 

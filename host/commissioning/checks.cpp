@@ -23,19 +23,23 @@ struct CheckRow {
   CheckFunction* run;
 };
 constexpr CheckRow rows[] = {
-    {"identity", 0, off, "", "The board says who it is.", check_identity},
+    {"identity", 0, off, "", "The board reports its identity.", check_identity},
     {"settings", 0, off, "", "The board keeps its wiring over a restart.", check_settings},
     {"chips", 0, off, "", "The chips of the paper's Figure 3 answer.", check_chips},
     {"supply", analog_channels, off, "", "An analog input shows what a multimeter shows.",
      check_supply},
-    {"handle", 0, off, "", "The dead-man's handle makes the board safe when it is let go.",
+    {"handle", 0, off, "", "The board goes safe when the dead-man's handle is released.",
      check_handle},
-    {"encoder", encoder_channels, off, "", "An encoder counts, forward upwards.", check_encoder},
+    {"encoder", encoder_channels, off, "",
+     "An encoder counts, and the counts rise when the wheel turns forward.", check_encoder},
     {"ultrasonic", ultrasonic_channels, off, "", "An ultrasonic sensor sees a hand.",
      check_ultrasonic},
-    {"user bus", 0, off, "", "Which addresses answer on the user's I2C bus.", check_user_bus},
-    {"uart", uart_channels, off, "", "A device at a user's UART is heard.", check_uart},
-    {"transports", 0, off, "", "States a second and losses of each transport.", check_transports},
+    {"user bus", 0, off, "",
+     "The user's I2C bus works; the report lists the addresses that answer.", check_user_bus},
+    {"uart", uart_channels, off, "", "The board receives the bytes of a device at a user's UART.",
+     check_uart},
+    {"transports", 0, off, "",
+     "The report lists the states a second and the losses of each transport.", check_transports},
     {"relay", relay_channels, off, "a relay clicks", "A relay closes.", check_relay},
     {"servo", servo_channels, off, "a servo goes to its middle", "A servo moves.", check_servo},
     {"motor supply", 0, wheels, "relay 1 closes", "Relay 1 gives the motors their supply.",
@@ -46,8 +50,8 @@ constexpr CheckRow rows[] = {
     {"stepper", stepper_channels, wheels, "a stepper turns", "A stepper turns as commanded.",
      check_stepper},
     {"silence", 0, wheels, "a motor turns",
-     "The board switches everything off when its host falls silent.", check_silence},
-    {"stop", 0, wheels, "relay 1 clicks", "A stop over each transport switches everything off.",
+     "The board switches all outputs off when its host is silent.", check_silence},
+    {"stop", 0, wheels, "relay 1 clicks", "A stop over each transport switches all outputs off.",
      check_stop},
 };
 
@@ -84,8 +88,8 @@ const Check& check_named(std::string_view id) {
   const auto found = std::find_if(checks().begin(), checks().end(),
                                   [&](const Check& check) { return check.id == id; });
   if (found != checks().end()) return *found;
-  throw Error(ErrorKind::usage, std::string(id), "there is no such check",
-              "r4 commission --list names them");
+  throw Error(ErrorKind::usage, std::string(id), "this is not a check",
+              "use a check that r4 commission --list shows");
 }
 
 CheckFunction* function_of(const Check& check) { return rows[check.row].run; }

@@ -22,8 +22,8 @@ using namespace std::chrono_literals;
 void take_wiring(const BoardWiring& kept, Report& report) {
   const bool changed = !report.wiring_source.empty() && kept.wiring != report.wiring;
   if (kept.source == WiringSource::given && !kept.in_use) {
-    throw Error(ErrorKind::usage, "the board", "it keeps a wiring that it does not use yet",
-                "press its reset button, and begin again");
+    throw Error(ErrorKind::usage, "the board", "the board stores a wiring that it does not use yet",
+                "press the reset button of the board, and restart this command");
   }
   report.wiring_source = to_text(kept.source);
   report.wiring = kept.wiring;
@@ -31,7 +31,7 @@ void take_wiring(const BoardWiring& kept, Report& report) {
   for (CheckResult& each : report.checks) {
     if (each.learnt.empty()) continue;
     each = CheckResult{each.id};
-    each.note = "the wiring of the board has changed since";
+    each.note = "the wiring of the board has changed since this check";
   }
 }
 
@@ -41,8 +41,8 @@ void identify(BoardUnderTest& board, Report& report) {
     const BoardIdentity identity = board.identify();
     if (!report.board_id.empty() && report.board_id != identity.board_id) {
       throw Error(ErrorKind::usage, report.board_id,
-                  "the report is of another board than " + identity.board_id,
-                  "begin a report for this board");
+                  "the report does not belong to board " + identity.board_id,
+                  "start a new report for this board");
     }
     report.board_id = identity.board_id;
     report.board_name = identity.name;
@@ -62,15 +62,15 @@ void identify(BoardUnderTest& board, Report& report) {
 void require_section(Checking& c) {
   if (c.check.section == Section::supply_off) {
     return c.require(Topic::supply_off,
-                     "The motor supply is OFF: its plug is out, or its switch is off. The carrier "
-                     "and the Giga have their supply. Confirm.",
+                     "Make sure that the motor supply is OFF: its plug is out, or its switch is "
+                     "off. The carrier and the Giga have their supply. Confirm.",
                      "the motor supply was not off");
   }
-  c.require(
-      Topic::wheels_off_ground,
-      "From here on motors turn. The wheels are OFF THE GROUND, nobody touches the robot, the "
-      "emergency switch is within reach, and the Giga is not supplied by USB alone. Confirm.",
-      "the wheels were not off the ground");
+  c.require(Topic::wheels_off_ground,
+            "In the next checks motors turn. Make sure that the wheels are OFF THE GROUND, that "
+            "people do not touch the robot, that the emergency switch is within reach, and that "
+            "the Giga is not supplied by USB alone. Confirm.",
+            "the wheels were not off the ground");
 }
 
 bool is_done(const CheckResult& result) {
@@ -110,7 +110,7 @@ void give_full_scale(Checking& c, const Learnt& learnt) {
   const double before = shown_volts(c, input);
   if (before < 1) {
     return c.say("There is no voltage at " + std::string(name.data(), name.size()) +
-                 " now: do its check again, and leave the voltage there.");
+                 " now: do the check of this input again, and keep the voltage connected.");
   }
   set_full_scale(c, input, known);
   const double with_known = shown_volts(c, input);
@@ -148,17 +148,18 @@ void offer_wiring(Checking& c, Report& report) {
   if (as_planned && outputs == 0) return;
   const WiringCheck fault = r4::check(learnt);
   if (fault.fault != WiringFault::none) {
-    return c.say("The learnt wiring is not whole yet: " + problem_of(learnt, fault).text() +
-                 ". Check the others of its kind, too.");
+    return c.say("The learnt wiring is not complete yet: " + problem_of(learnt, fault).text() +
+                 ". Also check the other signals of this kind.");
   }
-  if (!c.confirms(Topic::give_wiring,
-                  as_planned ? fmt::format("{} checks of outputs agree with the plan, and none "
-                                           "disagrees. Shall the board {} keep the plan as its "
-                                           "wiring? It then drives without E:CLEAR.",
-                                           outputs, report.board_id)
-                             : fmt::format("Shall the board {} keep the learnt wiring? {}. It "
-                                           "counts from the board's next start on.",
-                                           report.board_id, differences(report.wiring, learnt)))) {
+  if (!c.confirms(
+          Topic::give_wiring,
+          as_planned
+              ? fmt::format("All {} checks of outputs agree with the plan. Shall the board {} "
+                            "store the plan as its wiring? The board then drives without E:CLEAR.",
+                            outputs, report.board_id)
+              : fmt::format("Shall the board {} store the learnt wiring? {}. The board uses this "
+                            "wiring after its next start.",
+                            report.board_id, differences(report.wiring, learnt)))) {
     return;
   }
   c.board.give_wiring(learnt);
@@ -166,7 +167,7 @@ void offer_wiring(Checking& c, Report& report) {
   if (kept.source != WiringSource::given || !kept.in_use || kept.wiring != learnt) {
     return c.found(Finding::not_kept);
   }
-  c.note("the board keeps the wiring, and uses it" +
+  c.note("the board has stored the wiring, and uses it" +
          (as_planned ? std::string(": the plan") : ": " + differences(report.wiring, learnt)));
   report.wiring_source = to_text(kept.source);
   report.wiring = kept.wiring;
@@ -186,8 +187,8 @@ void offer_settings(Checking& c, Report& report) {
                         each.factor);
   }
   if (!c.confirms(Topic::give_settings,
-                  "Shall the board keep the calibration of its analog inputs, new full scale = "
-                  "present one x factor? " +
+                  "Shall the board store the calibration of its analog inputs, new full scale = "
+                  "present full scale x factor? " +
                       list + ".")) {
     return;
   }

@@ -72,7 +72,7 @@ void add_findings(std::string& html, const Report& report) {
   html += "<h2>Findings</h2>\n";
   const auto found = report.found();
   if (found.empty()) {
-    html += "<p>Nothing was found by the checks that were done.</p>\n";
+    html += "<p>The checks that were done found no faults.</p>\n";
     return;
   }
   html += "<table><tr><th>what</th><th>finding</th><th>what to do</th></tr>\n";
@@ -118,7 +118,7 @@ void add_wiring(std::string& html, const Report& report) {
                         shown(place_name(i, learnt.places[i])));
   }
   html += "</table>\n";
-  if (!any) html += "<p>As the plan.</p>\n";
+  if (!any) html += "<p>The same as the plan.</p>\n";
 }
 
 }  // namespace

@@ -98,7 +98,7 @@ std::string text(const Json& json, const char* key) { return json.value(key, std
 Learnt learnt_in(const Json& json, const std::string& name) {
   const auto* const word =
       std::find(std::begin(learnt_words), std::end(learnt_words), text(json, "what"));
-  if (word == std::end(learnt_words)) fail(name, "it learnt something unknown");
+  if (word == std::end(learnt_words)) fail(name, "a learnt value is unknown");
   Learnt learnt;
   learnt.what = static_cast<Learnt::What>(word - std::begin(learnt_words));
   learnt.signal = signal_named(text(json, "signal"));
@@ -107,7 +107,7 @@ Learnt learnt_in(const Json& json, const std::string& name) {
     const std::vector<Thing> things = alike(thing_of(learnt.signal).first);
     for (const int each : {learnt.signal, learnt.other}) {
       if (std::find(things.begin(), things.end(), thing_of(each)) == things.end()) {
-        fail(name, "it exchanges things of different kinds");
+        fail(name, "an exchange names things of different kinds");
       }
     }
   } else if (learnt.what == Learnt::What::place) {
@@ -116,7 +116,7 @@ Learnt learnt_in(const Json& json, const std::string& name) {
     learnt.factor = number(json.at("factor"));
     if (thing_of(learnt.signal).first != SignalKind::analog ||
         !(learnt.factor > 0 && learnt.factor <= 1000)) {
-      fail(name, "a full scale is not possible");
+      fail(name, "a full scale is not valid");
     }
   }
   return learnt;
@@ -147,7 +147,7 @@ CheckResult check_in(const Json& json, const std::string& name) {
 }
 
 Report report_in(const Json& all, const std::string& name) {
-  if (all.value("r4_commissioning", 0) != 1) fail(name, "it is not a report of a commissioning");
+  if (all.value("r4_commissioning", 0) != 1) fail(name, "this is not a commissioning report");
   const Json& board = all.at("board");
   Report report;
   report.begun = text(all, "begun");
@@ -183,7 +183,7 @@ std::string write_json(const Report& report) {
 }
 
 Report read_report(std::string_view json, const std::string& name) {
-  if (json.size() > max_report_text) fail(name, "it is longer than 1 MB");
+  if (json.size() > max_report_text) fail(name, "the report is longer than 1 MB");
   try {
     return report_in(Json::parse(json), name);
   } catch (const Json::parse_error& error) {

@@ -62,7 +62,7 @@ Ackermann::Ackermann(const Geometry& geometry) : geometry_(geometry) {
   if (!(geometry.max_steering_rad < std::numbers::pi / 2) || !(geometry.track_m >= 0)) {
     throw Error(ErrorKind::usage, "Ackermann",
                 "max_steering_rad reaches a right angle, or track_m is below 0",
-                "give radians, 0.6 say, and metres");
+                "give radians, such as 0.6, and metres");
   }
 }
 

@@ -23,8 +23,8 @@ FieldSet fields_of(std::string_view names) {
     const std::string_view name = names.substr(0, names.find(','));
     const StateField field = state_field(name);
     if (field == StateField::count) {
-      throw wrong("there is no state field " + std::string(name),
-                  "give names of docs/reference/protocol.md, ENC1 say, with commas between them");
+      throw wrong("this is not a state field: " + std::string(name),
+                  "give names of docs/reference/protocol.md, such as ENC1, separated by commas");
     }
     fields.add(field);
     names.remove_prefix(std::min(names.size(), name.size() + 1));
@@ -54,14 +54,15 @@ LoopGuard::LoopGuard(LoopOptions options)
   }
   for (const Standstill& each : options_.standstill) {
     if (each.encoder < 1 || each.encoder > encoder_channels) {
-      throw wrong("there is no encoder " + std::to_string(each.encoder), "give 1 to 4");
+      throw wrong("this is not an encoder: " + std::to_string(each.encoder), "give 1 to 4");
     }
     if (!is_drive(each.drive) || each.channel < 1 || each.channel > row_of(each.drive).channels) {
-      throw wrong("a standstill is watched of a motor that is not there",
+      throw wrong("a standstill names a motor that does not exist",
                   "give a channel 1 to 4 of osmc, dhb12 or bldc");
     }
     if (each.pwm <= 0 || each.counts < 0 || each.time.count() <= 0) {
-      throw wrong("a standstill of no duty, counts or time", "give a duty and a time above 0");
+      throw wrong("the duty, counts or time of a standstill is out of range",
+                  "give a duty and a time above 0");
     }
     needed_.add(state_field(FieldKind::encoder, each.encoder));
     motors_.push_back({.limits = each});
@@ -142,7 +143,7 @@ void LoopGuard::look_at_motors(const ReceivedState& state) {
                                  std::string(name_of(limits.drive)) + " " +
                                  std::to_string(limits.channel) + " has been driven with " +
                                  std::to_string(motor.pwm) + " for " + ms_text(limits.time) +
-                                 "; look at the wheel, and at the encoder's cable");
+                                 "; check the wheel and the encoder's cable");
     return;
   }
 }
@@ -158,9 +159,9 @@ LoopEnd LoopGuard::check(HostLinkState link, DisarmCause disarmed, Clock::time_p
     const bool any = last_ms_.has_value();
     end(LoopEnd::late,
         (any ? "the newest state was sampled more than " + ms_text(options_.late) + " ago"
-             : "no state came within " + ms_text(options_.first)) +
+             : "a state did not arrive within " + ms_text(options_.first)) +
             (options_.fields.empty() ? "" : " with all of " + options_.fields) +
-            "; look at the link, the board's rate and the fields that it is asked for");
+            "; check the link, the board's rate and the requested fields");
   }
   return end_;
 }

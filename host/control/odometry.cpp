@@ -14,7 +14,7 @@ double wrapped(double angle_rad) { return std::remainder(angle_rad, 2 * std::num
 Odometry::Odometry(const OdometryNoise& noise) : noise_(noise) {
   for (const double each : {noise.length_per_m, noise.turn_per_m, noise.turn_per_rad}) {
     if (std::isfinite(each) && each >= 0) continue;
-    throw Error(ErrorKind::usage, "Odometry", "a variance is below 0 or no number",
+    throw Error(ErrorKind::usage, "Odometry", "a variance is below 0 or not a number",
                 "give m^2 and rad^2 a metre, and rad^2 a radian");
   }
 }

@@ -17,12 +17,12 @@ Pid::Pid(const PidOptions& options) : options_(options) {
     }
   }
   if (options.minimum >= options.maximum) {
-    throw Error(ErrorKind::usage, "Pid", "its minimum is not below its maximum",
+    throw Error(ErrorKind::usage, "Pid", "the minimum is not below the maximum",
                 "give the range of the output, such as -1 and 1");
   }
   if (!(options.rate > 0) || options.derivative_filter_s < 0) {
-    throw Error(ErrorKind::usage, "Pid", "its rate is not above 0, or its filter is below",
-                "leave them out to do without");
+    throw Error(ErrorKind::usage, "Pid", "the rate is not above 0, or the filter is below 0",
+                "give valid values, or leave the rate and the filter out");
   }
   reset();
 }
@@ -47,8 +47,8 @@ void Pid::take_over(double output, double setpoint, double measured) {
 
 double Pid::step(double setpoint, double measured, double dt_s) {
   if (!std::isfinite(setpoint) || !std::isfinite(measured)) {
-    throw Error(ErrorKind::data, "Pid", "its setpoint or measured value is not a finite number",
-                "check what it is calculated from");
+    throw Error(ErrorKind::data, "Pid", "the setpoint or the measured value is not a finite number",
+                "check the calculation of both values");
   }
   if (!(dt_s > 0)) return output_;
   if (has_measured_) {

@@ -51,12 +51,12 @@ std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest
   }
   try {
     board.stop(options.rest_timeout);
-    return "; the board did not confirm that its motors rest, and was stopped";
+    return "; the board did not confirm that its motors are at rest, so it was stopped";
   } catch (const Error&) {
     board.stop_async();
     at_rest = false;
-    return "; the board confirms no stop: it is asked on, and goes safe by itself when it hears "
-           "nothing; " +
+    return "; the board did not confirm the stop: the stop is repeated, and without heartbeats the "
+           "board goes safe; " +
            std::string(stop_last_resort);
   }
 }
@@ -67,8 +67,8 @@ LoopReport run_loop(Board& board, const LoopOptions& options,
                     const std::function<std::optional<Setpoints>(const LoopStep&)>& step) {
   if (options.rest.empty()) {
     throw Error(ErrorKind::usage, "LoopOptions::rest",
-                "it is empty: the motors would be left as they are",
-                "name each motor of the loop, with 0");
+                "the group is empty, so the motors would keep their last setpoints",
+                "add a setpoint of 0 for each motor of the loop");
   }
   LoopGuard guard(options);
   LoopReport report;
@@ -92,7 +92,7 @@ LoopReport run_loop(Board& board, const LoopOptions& options,
       try {
         const std::optional<Setpoints> wanted = step({*state, *dt_s});
         if (!wanted) {
-          guard.end(LoopEnd::asked, "the step has ended it");
+          guard.end(LoopEnd::asked, "the step function ended the loop");
           break;
         }
         ++report.steps;

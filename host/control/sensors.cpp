@@ -16,7 +16,7 @@ Wheel::Wheel(const WheelGeometry& geometry, std::uint32_t window_ms, double max_
       metres_a_count_(2 * std::numbers::pi * geometry.radius_m / geometry.counts_a_turn *
                       (geometry.reversed ? -1 : 1)) {
   if (geometry.encoder < 1 || geometry.encoder > encoder_channels) {
-    throw Error(ErrorKind::usage, "Wheel", "there is no such encoder", "give 1 to 4");
+    throw Error(ErrorKind::usage, "Wheel", "the encoder does not exist", "give 1 to 4");
   }
   if (!(geometry.counts_a_turn > 0) || !(geometry.radius_m > 0) || !(max_speed_m_s > 0) ||
       window_ms == 0) {
@@ -71,8 +71,8 @@ SteeringSensor::SteeringSensor(const Calibration& calibration) : calibration_(ca
   const bool apart = std::abs(calibration.left_volts - calibration.right_volts) > 0.01 &&
                      calibration.left_rad > calibration.right_rad;
   if (apart && calibration.margin_volts >= 0) return;
-  throw Error(ErrorKind::usage, "SteeringSensor", "its two ends are not apart",
-              "steer to the left and to the right, and give the angles with their volts");
+  throw Error(ErrorKind::usage, "SteeringSensor", "the two ends have the same angle or voltage",
+              "steer to the left and to the right, and give both angles with their voltages");
 }
 
 std::optional<double> SteeringSensor::angle_rad(const State& state) const {

@@ -122,9 +122,9 @@ void AsyncBoard::require_slots(const Device& device) const {
   const int slots = device.last_slot() - device.first_slot() + 1;
   for (int slot = 1; fix.empty() && slot + slots - 1 <= i2c_slots; ++slot) {
     const Device moved(device.description(), device.address(), slot);
-    if (holder(moved) == nullptr) fix = "name a free one, " + moved.place() + ", or ";
+    if (holder(moved) == nullptr) fix = "use a free slot, " + moved.place() + ", or ";
   }
-  fix += "give the other up first:";
+  fix += "release that device first:";
   for (int slot = other->first_slot(); slot <= other->last_slot(); ++slot) {
     fix += fmt::format(" X:OFF,{}", slot);
   }

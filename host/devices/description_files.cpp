@@ -21,8 +21,8 @@ std::string_view DeviceDescription::text_of(const std::string& name) {
   for (const ShippedDescription& each : shipped_descriptions) {
     if (each.name == name) return each.text;
   }
-  throw Error(ErrorKind::usage, name, "no such device is described here",
-              fmt::format("there are {}; a file of your own is named by its path: ./{}.device",
+  throw Error(ErrorKind::usage, name, "a description of this device does not exist",
+              fmt::format("use one of {}; or give the path of your own file: ./{}.device",
                           fmt::join(shipped(), ", "), name));
 }
 

@@ -65,8 +65,8 @@ bool read_type(std::string_view word, DeviceValue& value) {
 
 DeviceDescription DescriptionParser::parse(std::string_view text) {
   if (text.size() > DeviceDescription::max_text) {
-    fail(fmt::format("it has more than {} bytes", DeviceDescription::max_text),
-         "a description has a line for each value; this is something else");
+    fail(fmt::format("the file has more than {} bytes", DeviceDescription::max_text),
+         "give a description of a device, which is a short text");
   }
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -87,7 +87,7 @@ void DescriptionParser::take_line(std::string_view line) {
   const Words words = words_of(line);
   const std::string_view what = words.front();
   if (result_.name.empty() && what != "device") {
-    fail("it does not begin with its name", "let the first line be: device NAME");
+    fail("the description does not begin with its name", "write as the first line: device NAME");
   }
   if (what == "device") return take_name(words);
   if (what == "title") return take_title(trimmed(line.substr(what.size())));
@@ -99,28 +99,30 @@ void DescriptionParser::take_line(std::string_view line) {
   if (what == "poll") return take_poll(words);
   if (what == "value") return take_value(words);
   if (what == "ready") return take_ready(words);
-  fail(fmt::format("\"{}\" is not one of its words",
+  fail(fmt::format("\"{}\" is not a valid word",
                    is_printable(what) ? what.substr(0, longest_name) : "this"),
-       "they are device, title, role, address, check, lookalike, write, poll, value and ready");
+       "use device, title, role, address, check, lookalike, write, poll, value or ready");
 }
 
 void DescriptionParser::take_name(const Words& words) {
   require_words(words, 2, 2, "device NAME");
-  if (!result_.name.empty()) fail("it has a name already", "give each device a file of its own");
+  if (!result_.name.empty())
+    fail("the device has a name already", "give each device a file of its own");
   result_.name = name_of(words[1]);
 }
 
 void DescriptionParser::take_title(std::string_view title) {
-  if (!result_.title.empty()) fail("it has a title already", "one does");
+  if (!result_.title.empty()) fail("the device has a title already", "leave this line out");
   if (title.empty() || !is_printable(title)) {
-    fail("the title is empty, or no plain text", "write what the device is: title TEXT");
+    fail("the title is empty, or not plain text", "write a title: title TEXT");
   }
   result_.title = title;
 }
 
 void DescriptionParser::take_role(const Words& words) {
   require_words(words, 2, 2, "role imu");
-  if (result_.role != DeviceRole::none) fail("it has a role already", "one does");
+  if (result_.role != DeviceRole::none)
+    fail("the device has a role already", "leave this line out");
   for (const DeviceRole role :
        {DeviceRole::imu, DeviceRole::power, DeviceRole::range, DeviceRole::angle}) {
     if (words[1] == to_text(role)) {
@@ -128,7 +130,7 @@ void DescriptionParser::take_role(const Words& words) {
       return;
     }
   }
-  fail("there is no such role", "it is imu, power, range or angle; without one leave the line out");
+  fail("this is not a valid role", "use imu, power, range or angle, or leave the line out");
 }
 
 void DescriptionParser::take_addresses(const Words& words) {
@@ -136,7 +138,7 @@ void DescriptionParser::take_addresses(const Words& words) {
   for (std::size_t i = 1; i < words.size(); ++i) {
     const int address = number(words[i], i2c_first_address, i2c_last_address, "an address");
     if (std::count(result_.addresses.begin(), result_.addresses.end(), address) != 0) {
-      fail("an address is named twice", "name it once");
+      fail("an address is named twice", "name each address once");
     }
     require_room(result_.addresses.size(), most_addresses, "addresses");
     result_.addresses.push_back(address);
@@ -147,7 +149,7 @@ void DescriptionParser::take_check(const Words& words) {
   require_words(words, 3, 3, "check REGISTER BYTES, such as check x75 x68");
   require_room(result_.checks.size(), DeviceDescription::max_lines, "checks");
   result_.checks.push_back({bytes(words[1], 0, i2c_max_register_bytes, "a register"),
-                            bytes(words[2], 1, i2c_max_bytes, "what is expected")});
+                            bytes(words[2], 1, i2c_max_bytes, "the expected value")});
 }
 
 void DescriptionParser::take_lookalike(const Words& words, std::string_view line) {
@@ -155,12 +157,12 @@ void DescriptionParser::take_lookalike(const Words& words, std::string_view line
   require_words(words, 4, longest_line, "lookalike REGISTER BYTES TITLE");
   require_room(result_.lookalikes.size(), DeviceDescription::max_lines, "lookalikes");
   DeviceLookalike other{bytes(words[1], 0, i2c_max_register_bytes, "a register"),
-                        bytes(words[2], 1, i2c_max_bytes, "what is found"),
+                        bytes(words[2], 1, i2c_max_bytes, "the value found"),
                         {}};
   other.title = line.substr(static_cast<std::size_t>(words[3].data() - line.data()));
   if (other.title.size() > longest_title || !is_printable(other.title)) {
-    fail("its title is too long, or not plain text",
-         fmt::format("write what it is with at most {} plain characters", longest_title));
+    fail("the title is too long, or not plain text",
+         fmt::format("write a title of at most {} plain characters", longest_title));
   }
   result_.lookalikes.push_back(std::move(other));
 }
@@ -169,10 +171,10 @@ void DescriptionParser::take_write(const Words& words) {
   constexpr const char* form = "write BYTES [wait MS], such as write x6b00 wait 50";
   require_words(words, 2, 4, form);
   if (words.size() == 3 || (words.size() == 4 && words[2] != "wait")) {
-    fail("it has not its form", std::string("write it as ") + form);
+    fail("the line does not have the form of its word", std::string("write it as ") + form);
   }
   require_room(result_.writes.size(), DeviceDescription::max_lines, "writes");
-  DeviceWrite write{bytes(words[1], 1, i2c_max_bytes, "what is written"),
+  DeviceWrite write{bytes(words[1], 1, i2c_max_bytes, "the written value"),
                     std::chrono::milliseconds{0}};
   if (words.size() == 4) {
     write.wait = std::chrono::milliseconds{number(words[3], 0, longest_wait_ms, "the wait in ms")};
@@ -183,13 +185,13 @@ void DescriptionParser::take_write(const Words& words) {
 void DescriptionParser::take_poll(const Words& words) {
   require_words(words, 5, 5, "poll NAME REGISTER COUNT PERIOD, such as poll motion x3b 14 10");
   if (result_.polls.size() == i2c_slots) {
-    fail(fmt::format("the board repeats {} readings at most", i2c_slots),
-         "read neighbouring registers by one");
+    fail(fmt::format("the board repeats at most {} readings", i2c_slots),
+         "read neighbouring registers with one poll");
   }
   DevicePoll poll;
   poll.name = name_of(words[1]);
   for (const DevicePoll& other : result_.polls) {
-    if (other.name == poll.name) fail("there is a poll of that name", "name it otherwise");
+    if (other.name == poll.name) fail("a poll has this name already", "choose another name");
   }
   poll.register_bytes = bytes(words[2], 0, i2c_max_register_bytes, "a register");
   poll.count = number(words[3], 1, i2c_max_bytes, "the count of bytes");
@@ -199,24 +201,26 @@ void DescriptionParser::take_poll(const Words& words) {
 }
 
 void DescriptionParser::take_value(const Words& words) {
-  require_words(words, 5, 20, "value NAME POLL BYTE TYPE, and what follows");
+  require_words(words, 5, 20, "value NAME POLL BYTE TYPE, and options");
   require_room(result_.values.size(), DeviceDescription::max_lines, "values");
   DeviceValue value;
   value.name = name_of(words[1]);
-  if (result_.find(value.name)) fail("there is a value of that name", "name it otherwise");
+  if (result_.find(value.name)) fail("a value has this name already", "choose another name");
   const auto poll = std::find_if(result_.polls.begin(), result_.polls.end(),
                                  [&](const DevicePoll& each) { return each.name == words[2]; });
   if (poll == result_.polls.end()) {
-    fail("no poll above has that name", "name one, or put the value below it");
+    fail("a poll of this name is not defined above",
+         "name a poll from above, or move this line below the poll");
   }
   value.poll = static_cast<std::size_t>(poll - result_.polls.begin());
-  value.at = number(words[3], 0, i2c_max_bytes - 1, "its first byte");
+  value.at = number(words[3], 0, i2c_max_bytes - 1, "the first byte");
   if (!read_type(words[4], value)) {
-    fail("there is no such type", "they are u8 and i8, and u or i, 16, 24 or 32, le or be: i16be");
+    fail("this is not a valid type",
+         "use u8, i8, or u or i, then 16, 24 or 32, then le or be, such as i16be");
   }
   if (value.at + value.size > poll->count) {
-    fail(fmt::format("it ends behind the {} bytes of its poll", poll->count),
-         "bytes count from 0; read more of them, or begin before");
+    fail(fmt::format("the value ends after the {} bytes of its poll", poll->count),
+         "read more bytes, or begin at an earlier byte; bytes count from 0");
   }
   take_options(words, 5, value);
   result_.values.push_back(std::move(value));
@@ -226,9 +230,11 @@ void DescriptionParser::take_ready(const Words& words) {
   require_words(words, 2, 3, "ready VALUE, or ready VALUE NUMBER");
   require_room(result_.ready.size(), DeviceDescription::max_lines, "lines that begin with ready");
   const auto value = result_.find(words[1]);
-  if (!value) fail("no value above has that name", "name one, or put this line below it");
+  if (!value)
+    fail("a value of this name is not defined above",
+         "name a value from above, or move this line below the value");
   DeviceReady ready{*value, std::nullopt};
-  if (words.size() == 3) ready.number = factor(words[2], "what that value is while it is set up");
+  if (words.size() == 3) ready.number = factor(words[2], "the number after ready");
   result_.ready.push_back(ready);
 }
 
@@ -237,11 +243,12 @@ void DescriptionParser::take_options(const Words& words, std::size_t first, Devi
   for (std::size_t i = first; i < words.size();) {
     const std::string_view what = words[i];
     if (std::count(seen.begin(), seen.end(), what) != 0) {
-      fail("a word is named twice", "name it once");
+      fail("a word is named twice", "name each word once");
     }
     seen.push_back(what);
     const std::size_t needs = what == "range" || what == "only" ? 2 : 1;
-    if (i + needs >= words.size()) fail("something is missing at its end", "say how much it is");
+    if (i + needs >= words.size())
+      fail("a word is missing at the end of the line", "add the number");
     const std::string_view word = words[i + 1];
     if (what == "bits") {
       const std::size_t dots = std::min(word.find(".."), word.size());
@@ -251,13 +258,14 @@ void DescriptionParser::take_options(const Words& words, std::size_t first, Devi
                               "the highest bit");
     } else if (what == "scale") {
       value.scale = factor(word, "the scale");
-      if (value.scale == 0) fail("the scale is 0", "say how much one of what is read is");
+      if (value.scale == 0) fail("the scale is 0", "write the size of one step, such as 0.01");
     } else if (what == "offset") {
       value.offset = factor(word, "the offset");
     } else if (what == "unit") {
       if (word.size() > longest_unit || !is_printable(word) ||
           word.find_first_of(",\"[]\\") != std::string_view::npos) {
-        fail("that is not a valid unit", "write it in plain characters: m/s2, rad/s, degC");
+        fail("this is not a valid unit",
+             "write the unit in plain characters, such as m/s2, rad/s or degC");
       }
       value.unit = word;
     } else if (what == "range") {
@@ -266,11 +274,12 @@ void DescriptionParser::take_options(const Words& words, std::size_t first, Devi
       if (value.minimum >= value.maximum) fail("the range is empty", "write range MIN MAX");
     } else if (what == "only") {
       const auto other = result_.find(word);
-      if (!other) fail("no value above has that name", "name one, or put this one below it");
-      value.only = {*other, factor(words[i + 2], "what that value is to be")};
+      if (!other)
+        fail("a value of this name is not defined above",
+             "name a value from above, or move this line below the value");
+      value.only = {*other, factor(words[i + 2], "the number after only")};
     } else {
-      fail("a word of the value is not known",
-           "they are bits, scale, offset, unit, range and only");
+      fail("a word of the value is not known", "use bits, scale, offset, unit, range or only");
     }
     i += 1 + needs;
   }
@@ -278,10 +287,12 @@ void DescriptionParser::take_options(const Words& words, std::size_t first, Devi
 
 void DescriptionParser::require_whole() {
   line_ = 0;
-  if (result_.name.empty()) fail("it is empty", "let it begin with: device NAME");
-  if (result_.addresses.empty()) fail("it has no address", "add a line: address 0x28");
-  if (result_.polls.empty()) fail("nothing is read", "add a line: poll NAME REGISTER COUNT PERIOD");
-  if (result_.values.empty()) fail("it has no value", "add a line: value NAME POLL BYTE TYPE");
+  if (result_.name.empty()) fail("the description is empty", "begin with the line: device NAME");
+  if (result_.addresses.empty()) fail("the device has no address", "add a line: address 0x28");
+  if (result_.polls.empty())
+    fail("the device has no poll", "add a line: poll NAME REGISTER COUNT PERIOD");
+  if (result_.values.empty())
+    fail("the device has no value", "add a line: value NAME POLL BYTE TYPE");
   require_role();
 }
 
@@ -301,7 +312,7 @@ void DescriptionParser::require_role() {
   } else if (result_.role == DeviceRole::range) {
     require_value("distance", "m");
     if (!std::isfinite(result_.values[*result_.find("distance")].maximum)) {
-      fail("its distance has no range", "add to that value: range MIN MAX");
+      fail("the value distance has no range", "add to its line: range MIN MAX");
     }
   } else if (result_.role == DeviceRole::angle) {
     require_value("angle", "rad");
@@ -312,18 +323,19 @@ void DescriptionParser::require_value(const char* name, const char* unit) {
   const auto found = result_.find(name);
   if (found && result_.values[*found].unit == unit) return;
   const std::string wanted = *unit == 0 ? "without a unit" : std::string("in ") + unit;
-  fail(fmt::format("with the role {} it needs a value {} {}", to_text(result_.role), name, wanted),
-       "add it, or leave the role out");
+  fail(fmt::format("the role {} needs a value {} {}", to_text(result_.role), name, wanted),
+       "add that value, or leave the role out");
 }
 
 void DescriptionParser::require_words(const Words& words, std::size_t least, std::size_t most,
                                       const char* form) {
   if (words.size() >= least && words.size() <= most) return;
-  fail(fmt::format("it has {} words", words.size()), std::string("write it as ") + form);
+  fail(fmt::format("the line has {} words", words.size()), std::string("write it as ") + form);
 }
 
 void DescriptionParser::require_room(std::size_t used, std::size_t most, const char* what) {
-  if (used >= most) fail(fmt::format("it has more than {} {}", most, what), "leave some out");
+  if (used >= most)
+    fail(fmt::format("the description has more than {} {}", most, what), "leave out some of them");
 }
 
 std::string DescriptionParser::name_of(std::string_view word) {
@@ -332,8 +344,9 @@ std::string DescriptionParser::name_of(std::string_view word) {
                        return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
                      });
   if (!right) {
-    fail("that is not a valid name",
-         fmt::format("take up to {} of a-z, 0-9 and _, a letter first", longest_name));
+    fail("this is not a valid name",
+         fmt::format("use up to {} characters of a-z, 0-9 and _, beginning with a letter",
+                     longest_name));
   }
   return std::string(word);
 }
@@ -347,7 +360,7 @@ int DescriptionParser::number(std::string_view word, int least, int most, const 
          fmt::format("write {} to {}, or in hexadecimal 0x{:x}", least, most, most));
   }
   if (value < static_cast<std::uint32_t>(least) || value > static_cast<std::uint32_t>(most)) {
-    fail(fmt::format("{} is out of range", what), fmt::format("it is {} to {}", least, most));
+    fail(fmt::format("{} is out of range", what), fmt::format("give {} to {}", least, most));
   }
   return static_cast<int>(value);
 }
@@ -371,7 +384,7 @@ double DescriptionParser::factor(std::string_view word, const char* what) {
     const double size = std::abs(result);
     if (size > largest_factor || (size < 1 / largest_factor && result != 0)) {
       fail(fmt::format("{} is out of range", what),
-           "it is up to 1e30, and no nearer to 0 than 1e-30");
+           "give 0, or a number whose size is from 1e-30 to 1e30");
     }
     more = end < word.size();
     if (more) joined = word[end];
@@ -386,12 +399,12 @@ std::vector<std::uint8_t> DescriptionParser::bytes(std::string_view word, std::s
   std::vector<std::uint8_t> result(count);
   if (word.size() % 2 != 1 || word[0] != 'x' ||
       !parse_hex(Text(word.substr(1)), result.data(), count)) {
-    fail(fmt::format("{} is not written as bytes", what),
-         "write x and two hexadecimal digits for each: x3b00; x alone is none");
+    fail(fmt::format("{} is not in the form of bytes", what),
+         "write x and two hexadecimal digits for each byte, such as x3b00; x alone means no bytes");
   }
   if (count < least || count > most) {
     fail(fmt::format("{} has {} bytes", what, count),
-         fmt::format("{} to {} can be sent", least, most));
+         fmt::format("give {} to {} bytes", least, most));
   }
   return result;
 }

@@ -33,14 +33,15 @@ Device::Device(DeviceDescription description, int address, int first_slot)
     : description_(std::move(description)), address_(address), first_slot_(first_slot) {
   const std::vector<int>& possible = description_.addresses;
   if (std::find(possible.begin(), possible.end(), address) == possible.end()) {
-    throw Error(ErrorKind::usage, text(), "it cannot have that address",
-                fmt::format("by its description it is 0x{:02x}", fmt::join(possible, ", 0x")));
+    throw Error(
+        ErrorKind::usage, text(), "the device cannot have this address",
+        fmt::format("use an address of its description: 0x{:02x}", fmt::join(possible, ", 0x")));
   }
   if (first_slot < 1 || first_slot > i2c_slots || last_slot() > i2c_slots) {
     throw Error(ErrorKind::usage, text(),
-                fmt::format("it takes {} slots from slot {} on, and the board has {}",
+                fmt::format("the device needs {} slots from slot {} on, and the board has {} slots",
                             description_.polls.size(), first_slot, i2c_slots),
-                "begin at a lower slot, or read fewer devices");
+                "choose a lower first slot, or read fewer devices");
   }
 }
 
@@ -104,8 +105,8 @@ DeviceReading Device::reading(const State& state, std::string_view value) const 
   std::string names;
   for (const DeviceValue& each : description_.values)
     names += (names.empty() ? "" : ", ") + each.name;
-  throw Error(ErrorKind::usage, text(), fmt::format("it has no value {}", value),
-              "it has " + names);
+  throw Error(ErrorKind::usage, text(), fmt::format("the device has no value {}", value),
+              "use one of " + names);
 }
 
 std::vector<DeviceReading> Device::readings(const State& state) const {

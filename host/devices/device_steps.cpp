@@ -64,25 +64,25 @@ std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step
                                     const I2cAnswer& answer) {
   Problem problem{ErrorKind::refused, device.text(), "", "", Outcome::refused};
   if (answer.outcome == I2cOutcome::cancelled) {
-    problem.reason = "its set-up was broken off: the board went safe, or another session began";
-    problem.fix = "set it up again";
+    problem.reason = "the set-up was cancelled: the board went safe, or another session began";
+    problem.fix = "set the device up again";
   } else if (answer.outcome != I2cOutcome::done) {
-    problem.reason = fmt::format("it does not answer: {}", to_text(answer.outcome));
-    problem.fix = "X:SCAN shows which addresses answer; look at supply, wires and pull-ups";
+    problem.reason = fmt::format("the device does not answer: {}", to_text(answer.outcome));
+    problem.fix = "send X:SCAN to see which addresses answer; check supply, wires and pull-ups";
   } else if (!step.expected.empty() && !std::equal(answer.data.begin(), answer.data.end(),
                                                    step.expected.begin(), step.expected.end())) {
-    problem.reason = fmt::format("it is another device: its register {} has {}, not {}", step.bytes,
-                                 hex_of(answer.data), hex_of(step.expected));
-    problem.fix = "look what is at that address, or describe it: r4 devices";
+    problem.reason = fmt::format("this is another device: its register {} has {}, not {}",
+                                 step.bytes, hex_of(answer.data), hex_of(step.expected));
+    problem.fix = "check which device has this address, or describe the device: r4 devices";
     for (const DeviceLookalike& each : device.description().lookalikes) {
       if (hex_of(each.register_bytes) != step.bytes || hex_of(each.found) != hex_of(answer.data)) {
         continue;
       }
-      problem.reason = fmt::format("it is {}: its register {} has {}, not {}", each.title,
+      problem.reason = fmt::format("this is {}: its register {} has {}, not {}", each.title,
                                    step.bytes, hex_of(answer.data), hex_of(step.expected));
       problem.fix = fmt::format(
-          "describe it: copy share/r4link/devices/{0}.device, let the copy check {1} {2}, compare "
-          "the rest with the data sheet, and name the copy: ./{0}.device",
+          "describe the device: copy share/r4link/devices/{0}.device, write check {1} {2} in the "
+          "copy, compare the rest with the data sheet, and give the path of the copy: ./{0}.device",
           device.description().name, step.bytes, hex_of(answer.data));
     }
   } else {
@@ -116,9 +116,8 @@ Problem explain(const Device& device, const CommandResult& result, const LinkSta
     }
     if (result.outcome == Outcome::timed_out && result.executed != 0) {
       return {ErrorKind::refused, device.text(),
-              "the end of its transfer was not heard: " + shown(step.command()),
-              "give each step more time, or look at the field I2CX of the state",
-              Outcome::timed_out};
+              "the end of the transfer was not reported: " + shown(step.command()),
+              "give each step more time, or check the field I2CX of the state", Outcome::timed_out};
     }
     problem = explain(step.command(), result, link);
   } else {  // the command for the fields failed

@@ -41,7 +41,7 @@ DevicePlace read_place(std::string_view text) {
   place.address = small_number(where.substr(0, colon));
   if (colon != where.size()) place.slot = small_number(where.substr(colon + 1));
   if (!place.address || (colon != where.size() && !place.slot)) {
-    throw Error(ErrorKind::usage, std::string(text), "its address or slot is not a number",
+    throw Error(ErrorKind::usage, std::string(text), "the address or slot is not a number",
                 "write NAME@ADDRESS or NAME@ADDRESS:SLOT, such as bno055@0x28:1");
   }
   return place;
@@ -74,13 +74,13 @@ std::vector<Device> Device::from(const std::vector<std::string>& texts) {
       const Device& other = devices[i];
       if (!newest.takes_place_of(other)) continue;
       if (newest.address() == other.address()) {
-        throw Error(ErrorKind::usage, newest.text(), other.text() + " has that address, too",
-                    "give one of them another: NAME@ADDRESS; a bus has one device at an address");
+        throw Error(ErrorKind::usage, newest.text(), other.text() + " has the same address",
+                    "give one device another address: NAME@ADDRESS");
       }
       throw Error(ErrorKind::usage, newest.text(),
-                  fmt::format("{} has slot {}, too", other.text(),
+                  fmt::format("{} also has slot {}", other.text(),
                               std::max(newest.first_slot(), other.first_slot())),
-                  "give one of them another: NAME@ADDRESS:SLOT");
+                  "give one device another slot: NAME@ADDRESS:SLOT");
     }
   }
   return devices;

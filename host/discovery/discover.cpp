@@ -61,7 +61,7 @@ FoundBoard Discovery::only() const {
   if (boards.empty()) {
     throw Error(ErrorKind::open, "the only board",
                 fmt::format("no R4 board was found ({})", searched(*this)),
-                "switch it on and connect it; r4 doctor finds what is wrong with this computer");
+                "switch the board on and connect it; r4 doctor checks this computer");
   }
   if (are_one(boards)) return boards.front();
   std::vector<std::string> urls;
@@ -76,7 +76,7 @@ FoundBoard Discovery::only() const {
 
 Discovery discover(const DiscoveryOptions& options) {
   if (options.udp_port == 0) {
-    throw Error(ErrorKind::usage, "UDP port 0", "no board listens at it", "give 1-65535");
+    throw Error(ErrorKind::usage, "UDP port 0", "0 is not a valid port of a board", "give 1-65535");
   }
   std::vector<std::future<Discovery>> searches;
   const auto begin = [&](bool wanted, auto search) {

@@ -60,12 +60,13 @@ std::size_t Fleet::find(std::string_view url_or_name) const {
   });
   if (found.size() == 1) return found.front();
   if (found.empty()) {
-    throw Error(ErrorKind::usage, std::string(url_or_name), "no board of the fleet is called so",
-                "name it by the URL that it was opened by; its name is known when it has answered");
+    throw Error(ErrorKind::usage, std::string(url_or_name),
+                "a board of this name is not in the fleet",
+                "use the URL of the board; a board's name is known after its first answer");
   }
   throw Error(ErrorKind::usage, std::string(url_or_name),
-              std::to_string(found.size()) + " boards of the fleet are called so",
-              "name it by its URL");
+              std::to_string(found.size()) + " boards of the fleet have this name",
+              "use the URL of the board");
 }
 
 FleetBoard Fleet::operator[](std::size_t board) {

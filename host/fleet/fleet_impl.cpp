@@ -21,7 +21,7 @@ std::vector<std::string> urls_of(const std::vector<std::string>& patterns) {
   std::vector<std::string> urls;
   for (PatternUrl& each : expand_urls(patterns)) urls.push_back(std::move(each.url));
   if (urls.empty()) {
-    throw Error(ErrorKind::usage, "a fleet", "it has no boards", "name at least one URL");
+    throw Error(ErrorKind::usage, "a fleet", "the fleet has no boards", "name at least one URL");
   }
   return urls;
 }
@@ -30,7 +30,7 @@ std::vector<std::string> urls_of(const std::vector<std::string>& patterns) {
 
 Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options)
     // Other threads only post to the loop, so its reactor needs no locks.
-    : BlockingLoop({"fleet", "see that this computer has time for it"},
+    : BlockingLoop({"fleet", "give this program more processor time"},
                    ASIO_CONCURRENCY_HINT_UNSAFE_IO, std::exchange(options.on_wait, nullptr)),
       role(options.role),
       urls(urls_of(patterns)) {
@@ -123,7 +123,7 @@ BoardHealth Fleet::Impl::health_of(std::size_t board) const {
 void Fleet::Impl::require_board(std::size_t board) const {
   if (board < boards.size()) return;
   throw Error(ErrorKind::usage, "board " + std::to_string(board), "the fleet has no such board",
-              "they are 0 to " + std::to_string(boards.size() - 1));
+              "give 0 to " + std::to_string(boards.size() - 1));
 }
 
 Fleet::Impl::CallPtr Fleet::Impl::call_of(std::string text, const Boards& which, Start start,

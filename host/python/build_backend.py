@@ -39,7 +39,7 @@ Requires-Python: {PROJECT['requires-python']}
 def _run(*command):
     ended = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     if ended.returncode != 0:
-        sys.exit(f'{ended.stdout}\n{" ".join(command)} failed\n  fix: tools/setup --python installs what the build needs')
+        sys.exit(f'{ended.stdout}\n{" ".join(command)} failed\n  fix: install the tools of the build: tools/setup --python')
 
 
 def configure(folder):
@@ -101,7 +101,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
 
 
 def build_editable(wheel_directory, config_settings=None, metadata_directory=None):
-    sys.exit('r4link: it cannot be installed with -e, because a part of it is compiled\n  fix: pip install . ; or, to work '
+    sys.exit('r4link: the package cannot be installed with -e, because a part is compiled\n  fix: pip install . ; or, to work '
              'on it, cmake --build build --target r4_python, and PYTHONPATH=build/python')
 
 

@@ -52,28 +52,30 @@ Error not_a_recording(const std::string& name, FileForm form) {
   switch (form) {
     case FileForm::pcap:
       return error("is a capture of packets, not a recording",
-                   "make a recording of it: r4 convert CAPTURE -o FILE.r4log");
+                   "convert the capture: r4 convert CAPTURE -o FILE.r4log");
     case FileForm::mcap:
       return error("is an MCAP file, not a recording in the native format",
-                   "make one of it: r4 convert FILE.mcap -o FILE.r4log");
+                   "convert the file: r4 convert FILE.mcap -o FILE.r4log");
     case FileForm::gzip:
-      return error("is compressed by gzip", "unpack it first: gzip -dk FILE.gz");
+      return error("is compressed by gzip", "unpack the file first: gzip -dk FILE.gz");
     case FileForm::xz:
-      return error("is compressed by xz", "unpack it first: xz -dk FILE.xz");
+      return error("is compressed by xz", "unpack the file first: xz -dk FILE.xz");
     case FileForm::bzip2:
-      return error("is compressed by bzip2", "unpack it first: bzip2 -dk FILE.bz2");
+      return error("is compressed by bzip2", "unpack the file first: bzip2 -dk FILE.bz2");
     case FileForm::lz4:
-      return error("is compressed by lz4", "unpack it first: lz4 -d FILE.lz4");
+      return error("is compressed by lz4", "unpack the file first: lz4 -d FILE.lz4");
     case FileForm::zip:
-      return error("is a zip archive", "unpack it first: unzip FILE.zip");
+      return error("is a zip archive", "unpack the file first: unzip FILE.zip");
     case FileForm::utf16:
-      return error("is text in UTF-16", "make it UTF-8: iconv -f UTF-16 -t UTF-8 FILE -o NEW");
+      return error("is text in UTF-16",
+                   "convert the file to UTF-8: iconv -f UTF-16 -t UTF-8 FILE -o NEW");
     case FileForm::zstd:
     case FileForm::text:
       break;
   }
-  return error("no recording",
-               "r4 record URL -o FILE makes one, and r4 convert makes one of a log of candump");
+  return error(
+      "is not a recording",
+      "make a recording with r4 record URL -o FILE, or convert a log of candump with r4 convert");
 }
 
 }  // namespace r4

@@ -112,12 +112,12 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
     line.remove_prefix(header_words.size());
     return take_number(line, ' ', std::numeric_limits<std::uint32_t>::max(), out.version)
                ? LineKind::header
-               : damaged(out, "a header without a version");
+               : damaged(out, "the header has no version");
   }
   if (line.starts_with(path_words)) {
     line.remove_prefix(path_words.size());
     if (!read_of_path(line, out.path.number, out.path.url, out.path.name)) {
-      return damaged(out, "no path is written so");
+      return damaged(out, "the line is not in the form of a path");
     }
     // Drops an invalid board name, because programs use names as table cells, topics or labels.
     if (!is_board_id(Text(out.path.name))) out.path.name.clear();
@@ -131,7 +131,7 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
     return read_of_path(line, device.path, device.place, device.description) &&
                    std::all_of(device.place.begin(), device.place.end(), is_plain)
                ? LineKind::device
-               : damaged(out, "no device is written so");
+               : damaged(out, "the line is not in the form of a device");
   }
   return LineKind::comment;
 }
@@ -140,7 +140,7 @@ LineKind read_record(std::string_view line, RecordLine& out) {
   const std::size_t time_size = line.find(' ');
   if (time_size == std::string_view::npos ||
       !read_time(line.substr(0, time_size), out.record.time)) {
-    return damaged(out, "it begins with no time");
+    return damaged(out, "the line does not begin with a time");
   }
   line.remove_prefix(time_size + 1);
   const std::size_t blank = line.find(' ');
@@ -149,15 +149,16 @@ LineKind read_record(std::string_view line, RecordLine& out) {
   std::uint32_t path = 0;
   if (kind == std::string_view::npos || !parse_number(Text(line.substr(0, blank - 1)), path) ||
       path > max_path) {
-    return damaged(out, "no path and direction behind the time");
+    return damaged(out, "a path and a direction do not follow the time");
   }
   out.record.kind = static_cast<RecordKind>(kind);
   out.record.path = static_cast<std::uint16_t>(path);
   out.text.clear();
   if (!append_unescaped(out.text, line.substr(blank + 1))) {
-    return damaged(out, "what is not printable is not written as \\xNN");
+    return damaged(out, "a byte that is not printable is not written as \\xNN");
   }
-  if (out.text.size() > max_record_bytes) return damaged(out, "it is longer than any record");
+  if (out.text.size() > max_record_bytes)
+    return damaged(out, "the line is longer than a record can be");
   out.record.bytes = out.text;
   return LineKind::record;
 }

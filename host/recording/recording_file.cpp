@@ -26,15 +26,16 @@ Error cannot_be_written(const std::string& path, int error) {
   }
   if (error == ENOSPC || error == EDQUOT || error == EFBIG) {
     return {ErrorKind::open, path, std::string("the recording has ended: ") + std::strerror(error),
-            "make room there, and bound what is kept: r4 record --keep 10G"};
+            "free some disk space, and limit the size: r4 record --keep 10G"};
   }
-  return {ErrorKind::open, path, std::strerror(error), "name a file that can be written"};
+  return {ErrorKind::open, path, std::strerror(error), "give a file that can be written"};
 }
 
 Error cannot_be_read(const std::string& path, int error) {
   const bool denied = error == EACCES || error == EPERM;
-  return {denied ? ErrorKind::permission : ErrorKind::open, path, std::strerror(error),
-          denied ? "allow reading it: chmod +r" : "name a recording, or - for standard input"};
+  return {
+      denied ? ErrorKind::permission : ErrorKind::open, path, std::strerror(error),
+      denied ? "allow reading of the file: chmod +r" : "give a recording, or - for standard input"};
 }
 
 // False if another program has locked the file. True on a file system without locks.
@@ -53,12 +54,13 @@ RecordingFile::RecordingFile(std::string path) : path_(std::move(path)) {
   if (::stat(path_.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
     throw Error(ErrorKind::open, path_,
                 S_ISDIR(status.st_mode) ? "is a directory" : "is not a file",
-                "name a file that can be written");
+                "give a file that can be written");
   }
   file_.reset(::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOCTTY, 0666));
   if (!file_ || ::fstat(file_.get(), &status) != 0) throw cannot_be_written(path_, errno);
   if (!lock_alone(file_.get())) {
-    throw Error(ErrorKind::open, path_, "another program records into it", "name another file");
+    throw Error(ErrorKind::open, path_, "another program records into this file",
+                "give another file");
   }
   size_ = static_cast<std::uint64_t>(status.st_size);
   if (size_ != 0) look_at_what_is_there();
@@ -72,7 +74,7 @@ void RecordingFile::look_at_what_is_there() {
   const bool compressed = is_zstd(beginning);
   const bool wanted = path_.ends_with(".zst");
   if (compressed != wanted || (!compressed && !beginning.starts_with("# r4log "))) {
-    throw Error(ErrorKind::data, path_, "holds something else already", "name another file");
+    throw Error(ErrorKind::data, path_, "already holds other data", "give another file");
   }
   char last = 0;
   if (::pread(file_.get(), &last, 1, static_cast<off_t>(size_ - 1)) < 0) {

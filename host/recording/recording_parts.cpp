@@ -36,7 +36,7 @@ bool has_limits(const RecordingOptions& options) {
 
 void require_limits(const RecordingOptions& options) {
   if (options.rotate_after.count() < 0) {
-    throw Error(ErrorKind::usage, "rotate_after", "is less than nothing", "give 1 s or more");
+    throw Error(ErrorKind::usage, "rotate_after", "is negative", "give 1 s or more");
   }
   if (options.keep_bytes == 0) return;
   if (options.keep_bytes < least_kept) {
@@ -45,7 +45,8 @@ void require_limits(const RecordingOptions& options) {
   }
   if (options.rotate_bytes > options.keep_bytes / least_parts) {
     throw Error(ErrorKind::usage, fmt::format("keep {}", options.keep_bytes),
-                "the files are too large for it", "keep four times as much as a file may hold");
+                "the limit is too small for the size of the files",
+                "keep at least four times the size of a file");
   }
 }
 
@@ -104,7 +105,7 @@ void RecordingParts::make_room() {
     std::filesystem::remove(part.path, error);
     if (error) {
       throw Error(ErrorKind::open, part.path, "cannot be removed: " + error.message(),
-                  "remove it, or record elsewhere");
+                  "remove the file, or record in another folder");
     }
     sum -= part.size;
   }

@@ -34,7 +34,7 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
   const bool one = !line.starts_with('#') || line.find('\n') == std::string_view::npos;
   if (!one || !read_record_line(line, read_)) {
     on_damage();
-    return one ? read_.problem : "it has the end of a line in it";
+    return one ? read_.problem : "the text contains the end of a line";
   }
   if (line == damage_line) damage_ = Damage::reported;
   const bool header = read_.kind == LineKind::header;
@@ -51,8 +51,8 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
     case LineKind::header:
       if (read_.version != record_version) {
         throw Error(ErrorKind::data, name_,
-                    std::string("a recording of a later version: ").append(line.substr(0, 60)),
-                    "read it with a newer r4");
+                    std::string("the recording has a later version: ").append(line.substr(0, 60)),
+                    "read the recording with a newer r4");
       }
       recognised_ = true;
       ended_ = false;
@@ -95,7 +95,7 @@ void RecordingLines::give(const Record& record) {
 void RecordingLines::on_sign_of_mixture() {
   if (damage_ == Damage::none) {
     throw Error(ErrorKind::data, name_,
-                "several recordings are mixed in it, so whose datagrams these are is unknown",
+                "several recordings are mixed, so the board of each datagram is unknown",
                 "read each recording alone, or join them one after the other: cat A.r4log B.r4log");
   }
   if (damage_ == Damage::here) visitor_.on_comment(damage_line);
@@ -125,7 +125,7 @@ void RecordingReader::on_compressed(std::string_view bytes) {
       if (part_size_ != 0) end_line({});
       if (zstd_->window_too_large() && !lines_.recognised()) {
         throw Error(ErrorKind::data, name_, ZstdReader::window_problem,
-                    "unpack it first: zstd -d --long=31 FILE.zst");
+                    "unpack the file first: zstd -d --long=31 FILE.zst");
       }
       lines_.on_damage();
       visitor_.on_damage({RecordingDamage::Kind::zstd, line_, taken_, zstd_->problem()});
@@ -171,7 +171,7 @@ void RecordingReader::end_line(std::string_view rest) {
   const std::uint64_t size = part_size_ + rest.size();
   const bool cr = rest.empty() ? part_.ends_with('\r') : rest.ends_with('\r');
   if (size > max_record_line + (cr ? 1 : 0)) {
-    damage(RecordingDamage::Kind::line, "longer than any line of a recording");
+    damage(RecordingDamage::Kind::line, "the line is longer than a line of a recording can be");
   } else {
     if (part_size_ != 0) part_ += rest;
     const char* const problem = lines_.on_line(part_size_ == 0 ? rest : part_);
@@ -188,7 +188,7 @@ void RecordingReader::finish() {
   if (text_beginning_.size() < form_bytes) on_lines(text_beginning_);
   const bool recognised = lines_.recognised();
   if (part_size_ != 0) {
-    damage(RecordingDamage::Kind::torn, "the last line is not whole");
+    damage(RecordingDamage::Kind::torn, "the last line is not complete");
   } else if (recognised && zstd_ && !zstd_->between_frames()) {
     damage(RecordingDamage::Kind::torn, "the recording was not ended");
   }

@@ -65,8 +65,9 @@ void RecordingTap::on_device(const Device& device) {
   if (description.size() > max_record_bytes) {
     return record(
         RecordKind::event,
-        fmt::format("warning {}: its description has {} bytes and is left out; {} are room",
-                    device.place(), description.size(), max_record_bytes));
+        fmt::format(
+            "warning {}: its description has {} bytes and is left out; the limit is {} bytes",
+            device.place(), description.size(), max_record_bytes));
   }
   recorder_->add_device({path_, device.place(), description});
 }

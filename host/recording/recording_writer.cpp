@@ -90,9 +90,9 @@ void RecordingWriter::look_after_file() {
   if (moved) write_out(true);
   const char* const what = moved ? "moved" : fate == Fate::removed ? "removed" : "truncated";
   trouble_ = {moved ? ErrorKind::open : ErrorKind::data, path_,
-              fmt::format("was {} while it was recorded, and is begun anew{}", what,
-                          moved ? "" : "; what was recorded before is lost"),
-              "let r4 record begin new files and remove old ones: --rotate, --keep"};
+              fmt::format("was {} during recording, so r4 has started a new file{}", what,
+                          moved ? "" : "; the earlier records are lost"),
+              "let r4 record start new files and remove old files: --rotate, --keep"};
   const std::string waiting = std::exchange(text_, {});
   begin_file();
   text_ += waiting;

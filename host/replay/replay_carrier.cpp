@@ -44,7 +44,7 @@ class ReplayCarrier final : public Carrier {
         timer_(io) {
     url.allow_only("speed path from");
     if (file_.empty()) {
-      throw Error(ErrorKind::usage, name_, "names no recording", "write replay:drive.r4log");
+      throw Error(ErrorKind::usage, name_, "does not name a recording", "write replay:drive.r4log");
     }
   }
   ~ReplayCarrier() override { close(); }

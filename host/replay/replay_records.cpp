@@ -20,7 +20,7 @@ const std::string& readable(const std::string& thing, const std::string& file) {
               error       ? error.message()
               : directory ? "is a directory"
                           : "is not a regular file",
-              "name a file that r4 record has written");
+              "give a file that r4 record has written");
 }
 
 bool is_of_the_transport(std::string_view event) {
@@ -47,12 +47,12 @@ ReplayRecords::ReplayRecords(const std::string& thing, const std::string& file, 
   if (!waiting_.empty()) return;
   if (passed_over_) {
     throw Error(ErrorKind::data, thing,
-                "the last of that path is of " + record_time_text(*passed_over_) +
-                    ", before the beginning that was asked for",
-                "begin earlier; r4 info " + file + " tells from when to when it goes");
+                "the last record of that path is of " + record_time_text(*passed_over_) +
+                    ", before the requested start",
+                "choose an earlier start; r4 info " + file + " shows the times of the recording");
   }
-  throw Error(ErrorKind::data, thing, "nothing of that path is there",
-              "r4 info " + file + " lists the paths");
+  throw Error(ErrorKind::data, thing, "that path has no records",
+              "choose another path; r4 info " + file + " lists the paths");
 }
 
 ReplayRecords::Item ReplayRecords::take() {

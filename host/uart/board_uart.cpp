@@ -14,8 +14,8 @@ namespace r4 {
 
 Board::Uart Board::uart(int channel) {
   if (channel < 1 || channel > uart_channels) {
-    throw Error(ErrorKind::usage, fmt::format("uart({})", channel), "there is no such UART",
-                fmt::format("there are 1 to {}", uart_channels));
+    throw Error(ErrorKind::usage, fmt::format("uart({})", channel), "the UART does not exist",
+                fmt::format("give 1 to {}", uart_channels));
   }
   return {*this, channel};
 }

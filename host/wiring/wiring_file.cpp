@@ -114,7 +114,7 @@ class Reader {
       const int signal = signal_named(single_spaced(line.substr(0, equals)));
       int& defined = lines_[static_cast<std::size_t>(signal)];
       if (defined != 0) {
-        fail(fmt::format("{} has a place in line {} already", signal_name(signal), defined),
+        fail(fmt::format("{} already has a place in line {}", signal_name(signal), defined),
              "delete one of the lines");
       }
       defined = line_;

@@ -114,11 +114,11 @@ std::string why_taken(int pin) {
     case PinUser::i2c:
       return "belongs to an I2C bus";
     case PinUser::uart:
-      return "belongs to a UART of the user's";
+      return "belongs to a user's UART";
     case PinUser::dac:
-      return "is an output voltage of the user's";
+      return "is a user's output voltage";
     case PinUser::light:
-      return "is the Giga's light";
+      return "is the Giga's LED";
     case PinUser::can:
       return "belongs to CAN";
     case PinUser::usb:
@@ -223,10 +223,10 @@ Problem problem_of(const Wiring& wiring, const WiringCheck& found) {
       break;
     case WiringFault::place:
       problem.reason = fmt::format("is not at a valid place: expected {}", expected(row.terminal));
-      problem.fix = "name such a place";
+      problem.fix = "choose one of these places";
       break;
     case WiringFault::option:
-      problem.reason = "has an option that it cannot have";
+      problem.reason = "has an option that is not valid for this signal";
       problem.fix = "leave the option out";
       break;
     case WiringFault::pin_taken:
@@ -238,23 +238,23 @@ Problem problem_of(const Wiring& wiring, const WiringCheck& found) {
       problem.fix = "choose one of A0 to A7";
       break;
     case WiringFault::twice:
-      problem.reason = fmt::format("{} is the place of {}, too", name, other);
-      problem.fix = "give each signal a place of its own";
+      problem.reason = fmt::format("{} is already the place of {}", name, other);
+      problem.fix = "give each signal its own place";
       break;
     case WiringFault::interrupt_line:
-      problem.reason = fmt::format("{} has interrupt line {}, which is that of {}", name,
+      problem.reason = fmt::format("{} has interrupt line {}, which is also the line of {}", name,
                                    interrupt_line(place), has_other ? other : "the WiFi chip");
       problem.fix = "choose a pin with another interrupt line (docs/reference/wiring.md)";
       break;
     case WiringFault::alone:
       problem.reason = fmt::format("is connected, but {} is not", other);
-      problem.fix = "connect both or none";
+      problem.fix = "connect both signals or none";
       break;
     case WiringFault::apart:
       problem.reason = fmt::format(
-          "{} is on another chip than {}, {}, or further than {} lines away", name, other,
+          "{} and {}, {}, are on different chips, or more than {} lines apart", name, other,
           place_name(found.other, wiring.places[found.other]), partner_lines - 1);
-      problem.fix = "the two lines of a motor change in one transfer: choose nearer lines";
+      problem.fix = "choose nearer lines, because the two lines of a motor change in one transfer";
       break;
   }
   return problem;

@@ -131,7 +131,7 @@ TEST_F(AsyncBoardTest, WarnsOnceWhenTheLoopWasHeldUp) {
   int warnings = 0;
   board.on_event([&](const CarrierEvent& event) {
     if (event.kind != CarrierEvent::Kind::warning) return;
-    EXPECT_TRUE(contains(event.problem.reason, "stood still"));
+    EXPECT_TRUE(contains(event.problem.reason, "did not run"));
     ++warnings;
   });
   board.open();

@@ -32,7 +32,7 @@ TEST_F(BoardI2c, ReadsWritesAndScans) {
 TEST_F(BoardI2c, RefusesACommandThatIsNotATransfer) {
   const Problem problem = problem_of([&] { board.i2c().transfer(Command::relay(2, false)); });
   EXPECT_EQ(problem.kind, ErrorKind::usage);
-  EXPECT_EQ(problem.reason, "is not a transfer on the I2C bus");
+  EXPECT_EQ(problem.reason, "is not a valid transfer on the I2C bus");
 }
 
 TEST_F(BoardI2c, PutsRepeatedReadingsIntoTheState) {

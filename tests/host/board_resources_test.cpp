@@ -38,8 +38,8 @@ std::string error_where(const RefusedCall& refused, const std::function<void()>&
 
 TEST(BoardResources, ReportsThatNoThreadIsLeft) {
   const std::string no_thread =
-      ": this user may have no more threads; end some programs, or allow more: ulimit -u shows how "
-      "many";
+      ": this user has reached the limit of threads; end some programs, or raise the limit, "
+      "which ulimit -u shows";
   EXPECT_EQ(error_where(no_threads, [] { const Board board("sim:"); }), "a board" + no_thread);
   EXPECT_EQ(error_where(no_threads, [] { const Fleet fleet({"sim:"}); }), "a fleet" + no_thread);
   EXPECT_EQ(error_where(no_threads,
@@ -53,7 +53,7 @@ TEST(BoardResources, ReportsThatNoThreadIsLeft) {
 
 TEST(BoardResources, ReportsThatTheSystemRefusesToWatchAFile) {
   const auto is_told = [](const std::string& error) {
-    return error.find("wait for as many files and sockets as they may") != std::string::npos;
+    return error.find("reached the limit of epoll watches") != std::string::npos;
   };
   EXPECT_PRED1(is_told, error_where(no_watches, [] { const Board board(a_board); }));
   EXPECT_PRED1(is_told, error_where(no_watches, [] { const Board board("sim:"); }));

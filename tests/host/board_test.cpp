@@ -190,12 +190,12 @@ TEST(Board, ErrorsNameTheReasonOfAnInactiveLink) {
   const Problem nobody = problem_of([&] { board.wait_active(30ms); });
   EXPECT_EQ(nobody.kind, ErrorKind::refused);
   EXPECT_EQ(nobody.thing, board.name());
-  EXPECT_TRUE(contains(nobody.reason, "nothing was heard"));
+  EXPECT_TRUE(contains(nobody.reason, "nothing was received"));
   const Problem command = problem_of([&] { board.osmc(1).set_pwm(1, Direction::forward, 30ms); });
   EXPECT_EQ(command.thing, "O:1,1,1");
   EXPECT_TRUE(contains(command.reason, "not confirmed within "));
-  EXPECT_TRUE(contains(command.reason, "nothing was heard"));
-  EXPECT_TRUE(contains(problem_of([&] { board.next_state(30ms); }).reason, "nothing was heard"));
+  EXPECT_TRUE(contains(command.reason, "nothing was received"));
+  EXPECT_TRUE(contains(problem_of([&] { board.next_state(30ms); }).reason, "nothing was received"));
   EXPECT_TRUE(contains(problem_of([&] { board.identify(30ms); }).reason, "not confirmed"));
   EXPECT_TRUE(contains(problem_of([&] { board.stop(30ms); }).reason, "not confirmed"));
   EXPECT_FALSE(board.post(Command::osmc(1, Pwm(1), Direction::forward)));
@@ -274,8 +274,9 @@ TEST(Board, ThrowsForAValueOutsideItsRangeAndNamesTheRange) {
   is_usage([&] { board.send("O:1,1"); });
   is_usage([&] { board.send("osmc 1"); });
   is_usage([&] { board.post(Command::osmc(1, Pwm(5000), Direction::forward)); });
-  EXPECT_EQ(problem_of([&] { board.osmc(5).set_pwm(1, Direction::forward); }).text(),
-            "O:1,1,5: no such channel; use O:pwm,dir,ch with pwm 0-4095, dir 0 or 1, ch 1-4");
+  EXPECT_EQ(
+      problem_of([&] { board.osmc(5).set_pwm(1, Direction::forward); }).text(),
+      "O:1,1,5: the channel does not exist; use O:pwm,dir,ch with pwm 0-4095, dir 0 or 1, ch 1-4");
   EXPECT_EQ(board.statistics().refused, 0U) << "an invalid command must not be sent";
 }
 

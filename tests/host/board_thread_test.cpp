@@ -154,7 +154,7 @@ TEST(TwoBoards, InOneProgramShareThePortAndGetTheirOwnDatagrams) {
   first.stop();
   EXPECT_EQ(second.state().safe, SafeReason::none);
   EXPECT_EQ(problem_of([&] { Board again(first.name()); }).reason,
-            "this program has that board open already");
+            "this program has already opened that board");
 }
 
 TEST(BoardCallbacks, ANewCallbackGetsTheLinkAndNewestStateOfASilentBoard) {

@@ -55,7 +55,7 @@ TEST(BoardTiming, RefusesImpossibleTimesBeforeSendingAnything) {
   }
   const Problem slow = problem_of([&] { board.link_timing(150ms, 50ms); });
   EXPECT_EQ(slow.kind, ErrorKind::usage);
-  EXPECT_TRUE(contains(slow.reason, "our own heartbeats"));
+  EXPECT_TRUE(contains(slow.reason, "this program sends a heartbeat"));
   EXPECT_TRUE(contains(slow.fix, "heartbeat_ms"));
 }
 

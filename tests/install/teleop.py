@@ -117,7 +117,7 @@ def main(program):
         teleop = Teleop(program, board.host_url)  # starts while the stop is latched
         teleop.says(r'^not armed')
         teleop.press('e')
-        teleop.says(r'not armed: stopped before this program began')
+        teleop.says(r'not armed: an emergency stop came before this program began')
         teleop.press('c')
         board.next(lambda each: each.get('reason') == 'none')
         arm_and_drive(teleop, board)

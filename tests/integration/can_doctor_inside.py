@@ -80,7 +80,7 @@ def test_doctor_fix_brings_a_virtual_bus_up():
 
 
 def test_doctor_names_another_protocol_on_an_id_of_the_board():
-    words = 'make no R4 datagram'
+    words = 'are not R4 datagrams'
     with Board('can://vcan0?node=5'):
         with subprocess.Popen(['cangen', 'vcan0', '-I', '185', '-L', '8', '-D', 'i', '-g', '10']) as other:
             sent = run('send', 'can://vcan0?node=5', 'R:1,On')

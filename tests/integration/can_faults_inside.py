@@ -163,7 +163,7 @@ def test_board_and_host_report_bus_errors_and_their_end(bus):
                 bus.order('errors', node, errors, 0)
                 each = end.next(where(reason))
                 assert 'wiring' in str(each)
-            end.next(where('the trouble is over'))  # each frame without an error lowers the error counter by one
+            end.next(where('the errors have stopped'))  # each frame without an error lowers the error counter by one
         streams_again(host, time.monotonic())
     assert not any(each.get('reason') == 'link' for each in board.log)
 

@@ -436,7 +436,7 @@ def test_list_and_monitor_show_every_board_of_a_bus(tmp_path):
     silent = run('monitor', 'can://vcan0', '--duration', '0.3', timeout=60)
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
     silent = run('record', 'can://vcan0', '-o', str(tmp_path / 'silence'), '--duration', '0.3', timeout=60)
-    assert silent.returncode == 3 and 'no board was heard' in silent.stderr, silent
+    assert silent.returncode == 3 and 'no board was found on the bus' in silent.stderr, silent
 
 
 def test_replay_acts_as_a_board_on_the_bus(tmp_path):

@@ -229,10 +229,10 @@ def test_r4_key_gives_and_removes_a_key_only_over_a_cable(tmp_path):
 @pytest.mark.parametrize('mode, text, code, words', [
     (0o644, f'3:{"0" * 64}', 5, 'chmod 600'),
     (0o620, f'3:{"0" * 64}', 5, 'chmod 600'),
-    (0o600, f'0:{"0" * 64}', 1, 'holds no key'),
-    (0o600, f'3:{"0" * 63}', 1, 'holds no key'),
-    (0o600, '', 1, 'holds no key'),
-    (0o600, f'3:{"0" * 64}' + 'x' * 10000, 1, 'holds no key'),
+    (0o600, f'0:{"0" * 64}', 1, 'does not hold a key'),
+    (0o600, f'3:{"0" * 63}', 1, 'does not hold a key'),
+    (0o600, '', 1, 'does not hold a key'),
+    (0o600, f'3:{"0" * 64}' + 'x' * 10000, 1, 'does not hold a key'),
 ])
 def test_a_key_file_that_is_invalid_or_readable_by_others_is_refused(tmp_path, mode, text, code, words):
     file = write_key(tmp_path / 'key', text, mode)
@@ -277,16 +277,16 @@ def test_a_key_file_of_another_user_is_a_permission_error():
         done = subprocess.run([*program, 'monitor', 'udp://127.0.0.1:9', '--key', key], check=False, text=True,
                               capture_output=True, timeout=10, **options)
     assert done.returncode == 5, done
-    assert 'run this as the user whose key it is' in done.stderr and ERROR.match(done.stderr)
+    assert 'run this as the owner of the key' in done.stderr and ERROR.match(done.stderr)
 
 
 @pytest.mark.parametrize('arguments, code, words', [
-    (['monitor', 'udp://127.0.0.1:9', '--key', ''], 2, '--key: names no file'),
+    (['monitor', 'udp://127.0.0.1:9', '--key', ''], 2, '--key: does not name a file'),
     (['monitor', 'udp://127.0.0.1:9', '--key', '/'], 4, '/: is a directory; name the file'),
     (['monitor', 'udp://127.0.0.1:9', '--key=~/.no-key'], 4, 'write $HOME/.no-key'),
     (['key', 'new', ''], 2, 'is not a file; name a file: r4 key new FILE'),
     (['key', 'new', 'serial:auto'], 2, 'is not a file; name a file: r4 key new FILE'),
-    (['key', 'new', '/no-such-folder/key'], 4, 'a place that can be written'),
+    (['key', 'new', '/no-such-folder/key'], 4, 'a folder that you may write to'),
     (['key', 'new', 'key', '--id', '10'], 2, 'write 1 to 9'),
     (['key', 'new', 'key', 'serial:auto'], 2, 'needs no board'),
     (['key', 'give', 'serial:auto', 'key'], 2, 'is not a file; name a file: r4 key give FILE serial:auto'),

@@ -156,7 +156,7 @@ def test_a_bridge_from_a_network_to_a_cable_needs_the_option_open(board):
     assert refused.returncode == 2 and ERROR.match(refused.stderr) and '--open' in refused.stderr
     with Bridge('udp://0.0.0.0:0', f'serial://{board.tty}', '--open') as bridge:
         warning = bridge.next(lambda each: each['type'] == 'transport' and each['event'] == 'warning')
-        assert warning['side'] == 'hosts' and 'it is open' in warning['reason']
+        assert warning['side'] == 'hosts' and 'the bridge is open' in warning['reason']
 
 
 def test_a_board_with_a_key_needs_the_key_in_bridge_and_host(tty, tmp_path):

@@ -85,7 +85,7 @@ def test_a_script_commissions_a_board_and_its_report_is_resumed(board, tmp_path)
     whole = json.loads(text)
     assert whole['board']['id'] == 'sim-1' and 'osmc 1 direction = osmc.1 inverted' in whole['learnt_wiring']
     page = report.read_text()
-    assert 'It goes the other way than commanded.' in page and '<script' not in page
+    assert 'The movement is in the opposite direction of the command.' in page and '<script' not in page
     assert 'http' not in page, 'the page is one file'
 
     for options in ((), ('--resume', '/dev/null')):
@@ -182,7 +182,7 @@ def test_a_keyboard_is_enough_and_letting_go_of_the_space_bar_stops(board, tmp_p
         terminal.type('  ')
         on = board.outputs(lambda outputs: outputs['relays'] == 1)
         off = board.outputs(lambda outputs: outputs['relays'] == 0)
-        assert off['came'] - on['came'] < within(0.5), 'no repeat came: the key was let go'
+        assert off['came'] - on['came'] < within(0.5), 'no repeat came: the key was released'
         terminal.until('too short to see[^$]*leave: ')
         terminal.until('Did the meter show[^$]*leave: ', typing=' ')
         terminal.type('y')

@@ -156,8 +156,8 @@ def test_convert_locates_damage_and_converts_the_rest(native, tmp_path):
     good = native.read_text()
     native.write_text(good.replace('1795468293.520000', 'x') + '17954')
     result = convert(native, tmp_path / 'again.r4log', code=DATA_BAD)
-    assert 'line 7, byte ' in result.stderr and 'it begins with no time; it is left out' in result.stderr
-    assert 'the last line is not whole' in result.stderr
+    assert 'line 7, byte ' in result.stderr and 'the line does not begin with a time; this part is left out' in result.stderr
+    assert 'the last line is not complete' in result.stderr
     kept = [line for line in good.splitlines(True) if not line.startswith('1795468293.520000')]
     assert (tmp_path / 'again.r4log').read_text() == ''.join(kept)
     piped = run('convert', '-', '-o', str(tmp_path / 'piped.r4log'), stdin=native.read_text())
@@ -175,7 +175,7 @@ def test_all_whole_lines_of_an_interrupted_pipe_are_read(native, tmp_path, comma
         with open(pipe, 'w', encoding='ascii') as writer:
             writer.write(''.join(lines[:-2]) + lines[-2][:30])
         told, _ = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == DATA_BAD and 'the last line is not whole' in told, told
+    assert process.returncode == DATA_BAD and 'the last line is not complete' in told, told
     assert command == 'info' or target.read_text().startswith(''.join(lines[:-2]))
 
 
@@ -213,10 +213,10 @@ def test_convert_reads_a_pipe_and_replaces_a_file_only_with_force(native, tmp_pa
 
 
 @pytest.mark.parametrize('name, content, code, message', [
-    ('x.r4log', 'zeros', DATA_BAD, 'no recording'),
-    ('x.r4log', b'', DATA_BAD, 'no recording'),
-    ('x.r4log', b'# r4log 2 by r4 9.0\n', DATA_BAD, 'a recording of a later version'),
-    ('x.csv', b'time [s],path\n', USAGE, '.csv is only written'),
+    ('x.r4log', 'zeros', DATA_BAD, 'is not a recording'),
+    ('x.r4log', b'', DATA_BAD, 'is not a recording'),
+    ('x.r4log', b'# r4log 2 by r4 9.0\n', DATA_BAD, 'the recording has a later version'),
+    ('x.csv', b'time [s],path\n', USAGE, '.csv cannot be read, only written'),
     ('x.r4log', None, OPEN, 'No such file'),
     ('x.r4log', 'directory', OPEN, 'Is a directory'),
     ('x.mcap', 'directory', OPEN, 'Is a directory'),
@@ -268,7 +268,7 @@ def claims(ending):
         # A frame of 100 GB, a frame with a window of 2 GiB, a line of 100 MB.
         '.r4log.zst': [(begins + frame + b'\xe0' + struct.pack('<Q', much) + bytes(100), 'a zstd frame that needs a window'),
                        (begins + frame + b'\0\xa8' + bytes(100), 'a zstd frame that needs a window'),
-                       (endless, 'the last line is not whole')],
+                       (endless, 'the last line is not complete')],
     }[ending]
 
 

@@ -95,7 +95,7 @@ def test_decodes_mixed_frames_of_eight_boards():
 @pytest.mark.parametrize('change, reason', [
     (lambda lines: lines[:3] + lines[4:], 'wrong sequence number'),
     (lambda lines: lines[:3] + log_lines(frames_of(with_crc(STATE))), 'interrupted by another transfer'),
-    (lambda lines: lines[:3] + ['(1795248809.120000) can0 123#\n'], 'no consecutive frame in time (N_Cr)'),
+    (lambda lines: lines[:3] + ['(1795248809.120000) can0 123#\n'], 'the next consecutive frame did not come in time (N_Cr)'),
 ])
 def test_a_failed_transfer_is_reported_with_its_reason(change, reason):
     code, printed, summary = decode(''.join(change(log_lines(frames_of(with_crc(STATE))))))

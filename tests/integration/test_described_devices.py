@@ -40,7 +40,7 @@ def test_a_wrong_description_is_reported_with_its_line(tmp_path):
     path.write_text(MINE.replace('bus 0', 'bus 1'))
     result = run('devices', str(path))
     assert result.returncode == 1
-    assert f'{path}, line 5: it ends behind the 2 bytes of its poll' in result.stderr
+    assert f'{path}, line 5: the value ends after the 2 bytes of its poll' in result.stderr
     for command in (('devices', 'bno056'), ('monitor', 'udp://127.0.0.1', '--device', 'bno056'),
                     ('monitor', 'udp://127.0.0.1', '--device', 'bno055@0x30'),
                     ('monitor', 'udp://127.0.0.{1-2}', '--device', 'bno055'),
@@ -61,7 +61,7 @@ def test_monitor_sets_up_devices_and_shows_their_values(board, tmp_path):
         with Running('monitor', board.host_url, *devices, '--json') as beside:
             assert beside.next(is_reading('bno055@0x28', 'heading'))['fields']['heading'] == 270
     wrong = run('monitor', board.host_url, '--device', 'icm20948@0x68', '--duration', '2')
-    assert 'icm20948@0x68: it is another device: its register x00 has x00, not xea' in wrong.stdout
+    assert 'icm20948@0x68: this is another device: its register x00 has x00, not xea' in wrong.stdout
 
 
 def test_a_reset_device_is_reported_and_set_up_again(tmp_path):

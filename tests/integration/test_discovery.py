@@ -133,12 +133,12 @@ def test_two_boards_with_one_name_are_distinguished_by_their_ids(lan, boards):
     boards('10.77.0.3', 'b-3', '--set', 'name,left')
     result = run('send', 'udp:?id=left', 'R:1,On', **lan.host.inside)
     assert result.returncode == USAGE, result
-    assert "several boards are called 'left'" in result.stderr
+    assert "several boards are named 'left'" in result.stderr
     assert 'udp:?id=b-2' in result.stderr and 'udp:?id=b-3' in result.stderr
     assert {each['url'] for each in found(lan.host).values()} == {'udp:?id=b-2', 'udp:?id=b-3'}
     assert run('send', 'udp:?id=b-3', 'R:1,On', **lan.host.inside).returncode == 0
     unknown = run('send', 'udp:?id=right', 'R:1,On', **lan.host.inside)
-    assert unknown.returncode == OPEN and "no board called 'right' answered, 2 others did" in unknown.stderr
+    assert unknown.returncode == OPEN and "no board named 'right' answered, but 2 other boards did" in unknown.stderr
 
 
 def test_garbage_and_forged_answers_hide_no_board(lan, boards):

@@ -49,7 +49,7 @@ def test_an_option_of_one_meaning_has_one_name_in_all_commands():
         for name, meaning in re.findall(r'^  (-\S+)[^\n]*?  +(\S[^\n]*)$', run(command, '--help').stdout, re.MULTILINE):
             names.setdefault(meaning, set()).add(name)
     assert [each for each in names.values() if len(each) > 1] == []
-    assert names['end after that time'] == {'--duration'}
+    assert names['end after this time'] == {'--duration'}
 
 
 def test_list_names_ports_and_urls():

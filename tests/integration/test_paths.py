@@ -262,12 +262,12 @@ def test_paths_to_two_boards_are_refused_with_both_names():
 @pytest.mark.parametrize('arguments, told', [
     (('send', 'udp://127.0.0.1', 'udp://127.0.0.1', 'R:1,On'), 'the same path is given twice'),
     (('send', 'udp://127.0.0.1', 'udp:auto'), 'CMD: is missing'),
-    (('send', 'udp://127.0.0.1', 'R:1,On', 'udp:auto'), 'a URL cannot stand behind R:1,On'),
-    (('send', 'sim:', 'udp://127.0.0.1', 'R:1,On'), 'a board of its own'),
-    (('send', 'serial:auto', 'udp://127.0.0.1', 'C:key,1:' + 64 * 'a'), 'others would see it'),
-    (('stop', *(f'udp://127.0.0.{i}' for i in range(1, 6))), 'one to 4 are possible'),
+    (('send', 'udp://127.0.0.1', 'R:1,On', 'udp:auto'), 'a URL cannot follow R:1,On'),
+    (('send', 'sim:', 'udp://127.0.0.1', 'R:1,On'), 'a separate board'),
+    (('send', 'serial:auto', 'udp://127.0.0.1', 'C:key,1:' + 64 * 'a'), 'other programs could read it'),
+    (('stop', *(f'udp://127.0.0.{i}' for i in range(1, 6))), 'one to 4 paths are possible'),
     (('monitor', 'serial:auto+upd://127.0.0.1'), "there is no transport 'upd'"),
-    (('monitor', 'can://can0?node=0-3+udp://127.0.0.1:20-21'), 'its paths lead to 4 and to 2 boards'),
+    (('monitor', 'can://can0?node=0-3+udp://127.0.0.1:20-21'), 'the paths lead to 4 and to 2 boards'),
 ])
 def test_invalid_urls_and_paths_are_refused_with_one_line(arguments, told):
     refused = run(*arguments)

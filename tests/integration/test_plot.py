@@ -90,9 +90,9 @@ def test_plot_writes_png_and_pdf_files(native, tmp_path):
 
 @pytest.mark.parametrize('arguments, code, message', [
     (['AIN99', '-o', 'a.svg'], USAGE, 'AIN99: is not a field of a state'),
-    (['AIN24', '-o', 'a.bmp'], USAGE, 'has no ending that tells what to draw'),
-    (['ENC1', '-o', 'a.svg'], DATA_BAD, 'ENC1: is in no state of'),
-    (['middle-arm:AIN24', '-o', 'a.svg'], DATA_BAD, 'middle-arm:AIN24: is in no state of'),
+    (['AIN24', '-o', 'a.bmp'], USAGE, 'does not have the ending of a picture format'),
+    (['ENC1', '-o', 'a.svg'], DATA_BAD, 'ENC1: does not occur in the states of'),
+    (['middle-arm:AIN24', '-o', 'a.svg'], DATA_BAD, 'middle-arm:AIN24: does not occur in the states of'),
     (['AIN24', '-o', '/nowhere/a.svg'], OPEN, 'No such file'),
 ])
 def test_arguments_that_cannot_be_drawn_are_refused(native, tmp_path, arguments, code, message):
@@ -104,7 +104,7 @@ def test_arguments_that_cannot_be_drawn_are_refused(native, tmp_path, arguments,
 def test_damage_is_reported_and_the_rest_is_drawn(native, tmp_path):
     native.write_text(native.read_text().replace('# path 2', 'path 2', 1))
     result = run('plot', str(native), 'AIN24', '-o', str(tmp_path / 'a.svg'))
-    assert result.returncode == DATA_BAD and 'some of it could not be read' in result.stderr, result
+    assert result.returncode == DATA_BAD and 'some parts could not be read' in result.stderr, result
     assert (tmp_path / 'a.svg').exists()
 
 

@@ -70,7 +70,7 @@ def test_list_reports_a_port_without_a_board(tmp_path):
     path = tmp_path / 'nothing'
     listed = run('list', '--serial', path)
     assert listed.returncode == 0, listed
-    assert f'no R4 board answered at serial://{path}\n    there is no such device; ' in listed.stdout, listed.stdout
+    assert f'no R4 board answered at serial://{path}\n    the device does not exist; ' in listed.stdout, listed.stdout
 
 
 def listed(path):

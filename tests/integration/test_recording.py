@@ -127,7 +127,7 @@ def test_replay_steps_from_any_time_and_reports_damage(recorded):
     was = re.findall(r'^[\d.]+ 1< (.*)$', recorded.read_text(), re.MULTILINE)
     ended = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', stdin='\n' * 1000)
     assert [line.split(' ', 1)[1] for line in ended.stdout.splitlines()[1:-1]] == was
-    assert ended.returncode == DATA_BAD and re.search(r'line \d+: it begins with no time', ended.stderr), ended
+    assert ended.returncode == DATA_BAD and re.search(r'line \d+: the line does not begin with a time', ended.stderr), ended
     first = float(re.search(r'^([\d.]+) 1', recorded.read_text(), re.MULTILINE)[1])
     said = re.findall(r'^([\d.]+) 1< (.*)$', recorded.read_text(), re.MULTILINE)
     then = next(datagram for at, datagram in said if float(at) >= first + 0.2)
@@ -228,7 +228,7 @@ def test_record_starts_a_new_file_when_its_file_is_moved_or_removed(board, tmp_p
         path.unlink()
         wait_for(path, ' 0! warning ')
         assert recorder.end() == DATA_BAD
-    assert ERROR.search(recorder.errors) and 'what was recorded before is lost' in recorder.errors
+    assert ERROR.search(recorder.errors) and 'the earlier records are lost' in recorder.errors
     (told,), code = info(path)
     assert code == 0 and told['ended'] and not told['damage'], told
 
@@ -278,8 +278,8 @@ def test_info_locates_damage_and_reads_the_rest(tmp_path):
     path.write_text('# r4log 1 by r4\n' + good + '17954x\n' + good + good[:20])
     result = run('info', str(path))
     assert result.returncode == DATA_BAD
-    assert 'line 3, byte 64: it begins with no time' in result.stdout
-    assert 'line 5, byte 119: the last line is not whole' in result.stdout
+    assert 'line 3, byte 64: the line does not begin with a time' in result.stdout
+    assert 'line 5, byte 119: the last line is not complete' in result.stdout
     assert info(path)[0][0]['records'] == 2
 
 
@@ -309,8 +309,8 @@ def test_control_characters_of_a_recording_are_not_printed(tmp_path):
     (['sim:'], '--output: is missing'),
     (['sim:', '-o', 'x', '--rotate', '5'], 'is neither a size nor a time'),
     (['sim:', '-o', 'x', '--keep', '1K'], 'is too little'),
-    (['sim:', '-o', 'x', '--keep', '2M', '--rotate', '1M'], 'the files are too large for it'),
-    (['sim:', '-o', 'x', '--duration', '0'], 'is too short for anything'),
+    (['sim:', '-o', 'x', '--keep', '2M', '--rotate', '1M'], 'the limit is too small for the size of the files'),
+    (['sim:', '-o', 'x', '--duration', '0'], 'is too short'),
 ])
 def test_wrong_uses_are_refused_before_anything_is_opened(tmp_path, arguments, message):
     result = run('record', *arguments, cwd=tmp_path)

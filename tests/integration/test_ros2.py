@@ -360,7 +360,7 @@ def test_no_output_is_driven_before_arming():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
             Ros2(domain, board.host_url, '--deadline', '0.3') as ros2:
-        ros2.logged('the board takes commands')
+        ros2.logged('the board accepts commands')
         join(ros2, peer, 'R4_Command', STRING)
         again(lambda: peer.write('rt/R4_Command', text('O:358,1,1')),
               lambda timeout: ros2.logged('not armed (not yet)', timeout=timeout))
@@ -384,7 +384,7 @@ def test_each_board_has_a_namespace_and_a_lost_board_is_reported():
             peer.read('rt/rosout', LOG, 'reliable', 'transient_local')
             peer.writer('rt/stop', BOOL, matched=False)
             told = ros2.logged('/stop: a publisher (')
-            assert 'is not heard here; publish /board1/stop, and so on for each board' in told['text']
+            assert 'uses a topic that r4 ros2 does not receive; publish /board1/stop, and so on for each board' in told['text']
             right.signal(signal.SIGKILL)
             peer.sample('rt/board2/R4_Active', lambda payload: texts(payload) == 'False')
             peer.sample('rt/rosout', lambda payload: b'board2.r4\0' in payload and b'\0' in payload)
@@ -403,7 +403,7 @@ def test_two_nodes_with_one_name_warn_about_each_other():
             for _ in range(2):  # the two messages arrive in either order
                 assert peer.sample('rt/rosout', lambda data: b'has a node /r4, too' in data)[8] == 30
         with Ros2(domain, other.host_url, '--namespace', 'other') as third:
-            third.logged('the board is there')
+            third.logged('the board is connected')
             assert not any(' too: ' in each.get('text', '') for each in third.log)
 
 

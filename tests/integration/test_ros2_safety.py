@@ -70,7 +70,7 @@ def test_an_arm_during_an_outage_has_no_effect_afterwards():
         again(lambda: peer.write('rt/R4_Command', text('E:CLEAR')),
               lambda timeout: ros2.logged('E:CLEAR: ', timeout=timeout))
         board.signal(signal.SIGCONT)
-        ros2.logged('the board takes commands')
+        ros2.logged('the board accepts commands')
         again(lambda: peer.write('rt/R4_Command', text('O:358,1,1')),
               lambda timeout: ros2.logged('not armed (stop)', timeout=timeout))
         arm()
@@ -98,9 +98,9 @@ def test_a_best_effort_stop_is_obeyed_and_a_qos_mismatch_is_reported():
         again(lambda: peer.write('rt/stop', ON), lambda timeout: ros2.logged('E:STOP: confirmed', timeout=timeout))
         board.state('SAFE', 'stop')
         peer.writer('rt/osmc1/command', FLOAT32, reliability='best_effort', matched=False)
-        ros2.logged('osmc1/command: a publisher does not offer what this subscription needs, reliability')
+        ros2.logged('osmc1/command: a publisher does not offer the required reliability')
         peer.read('rt/R4', STRING, durability='transient_local')
-        ros2.logged('R4: a subscriber asks for more than this publisher offers, in durability')
+        ros2.logged('R4: a subscriber requires more durability than this publisher offers')
 
 
 def test_a_publisher_of_another_type_is_reported_while_it_exists():
@@ -109,9 +109,9 @@ def test_a_publisher_of_another_type_is_reported_while_it_exists():
         peer.read('rt/rosout', LOG)
         peer.sample('rt/diagnostics', lambda payload: health_of(payload)[0] == 0)
         for topic, of, words in (
-                ('osmc1/command', 'std_msgs::msg::dds_::Float64_', b'std_msgs/msg/Float64, and is not heard'),
-                ('arm', STRING, b'std_msgs/msg/String, and is not heard'),
-                ('stop', STRING, b'std_msgs/msg/String, and is not heard'),
+                ('osmc1/command', 'std_msgs::msg::dds_::Float64_', b'std_msgs/msg/Float64, so its messages are ignored'),
+                ('arm', STRING, b'std_msgs/msg/String, so its messages are ignored'),
+                ('stop', STRING, b'std_msgs/msg/String, so its messages are ignored'),
                 ('cmd_vel', TWIST, b'--drive'), ('relay1/command', BOOL, b'supply')):
             peer.writer(f'rt/{topic}', of, matched=False)
             told = ros2.logged(words.decode())
@@ -163,7 +163,7 @@ def test_the_option_arm_does_not_arm_after_an_earlier_stop():
         join(ros2, peer, 'stop', BOOL)
         again(lambda: peer.write('rt/stop', ON), lambda timeout: ros2.logged('CUT THE POWER', timeout=timeout))
         with Board(url) as board:
-            ros2.logged('--arm: a stop came first; arm when the danger is over')
+            ros2.logged('--arm: a stop came first; arm the board when the danger is over')
             board.state('SAFE', 'stop')
 
 
@@ -173,8 +173,8 @@ def test_a_restarted_node_does_not_clear_an_earlier_stop():
         assert run('stop', board.host_url).returncode == 0
         board.state('SAFE', 'stop')
         with Ros2(domain, board.host_url, '--arm') as ros2:
-            told = ros2.logged('not armed: stopped before this program began')['text']
-            assert told.endswith('clear it on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm'), told
+            told = ros2.logged('not armed: an emergency stop came before this program began')['text']
+            assert told.endswith('clear the cause on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm'), told
             assert not any(each.get('supply') for each in board.log)
             join(ros2, peer, 'R4_Command', STRING)
             join(ros2, peer, 'arm', BOOL)
@@ -197,7 +197,7 @@ def test_a_stepper_without_a_reported_position_is_not_driven():
     with armed('--fields', 'DEFAULT') as (_, ros2, peer):
         join(ros2, peer, 'stepper2/command', INT32)
         again(lambda: peer.write('rt/stepper2/command', (1000).to_bytes(4, 'little')),
-              lambda timeout: ros2.logged('nobody could stop it; add STEP2POS to --fields', timeout=timeout))
+              lambda timeout: ros2.logged('could not stop the stepper; add STEP2POS to --fields', timeout=timeout))
 
 
 def test_a_topic_cannot_change_the_reported_fields():
@@ -206,7 +206,7 @@ def test_a_topic_cannot_change_the_reported_fields():
         join(ros2, peer, 'R4_Command', STRING)
         drive(board, peer, 'rt/stepper2/command', (100_000).to_bytes(4, 'little'), lambda each: each['stepper'][1][1])
         again(lambda: peer.write('rt/R4_Command', text('F:AIN24')),
-              lambda timeout: ros2.logged('fields are not chosen from a topic', timeout=timeout))
+              lambda timeout: ros2.logged('a topic cannot choose state fields', timeout=timeout))
         peer.say('remove', 'rt/stepper2/command')
         board.outputs(lambda each: not each['stepper'][1][1])
 
@@ -215,7 +215,7 @@ def test_a_text_with_one_refused_command_is_not_executed():
     with armed('--fields', 'DEFAULT') as (board, ros2, peer):
         join(ros2, peer, 'R4_Command', STRING)
         again(lambda: peer.write('rt/R4_Command', text('O:358,1,1;P:1,1000,2')),
-              lambda timeout: ros2.logged('nobody could stop it', timeout=timeout))
+              lambda timeout: ros2.logged('could not stop the stepper', timeout=timeout))
         drive(board, peer, 'rt/R4_Command', text('O:77,1,2'), lambda each: pwm(each, 2) == 77)
         assert not any(pwm(each['outputs'], 1) for each in board.log if 'outputs' in each)
 
@@ -224,7 +224,7 @@ def test_too_many_commands_in_one_text_are_reported():
     with armed() as (_, ros2, peer):
         join(ros2, peer, 'R4_Command', STRING)
         again(lambda: peer.write('rt/R4_Command', text('Q:ID;' * 4 + 'X:SCAN')),
-              lambda timeout: ros2.logged('more than 4 at once that drive no output (X:SCAN)', timeout=timeout))
+              lambda timeout: ros2.logged('more than 4 commands without an output arrived at once (X:SCAN)', timeout=timeout))
 
 
 def test_a_client_that_reads_no_answers_does_not_delay_topics():

@@ -152,7 +152,7 @@ def hears_on(watcher, _, stopped):
 def test_a_suspended_holder_of_the_only_port_is_named():
     def is_told(watcher, pid, _):
         told = watcher.next(lambda each: each['type'] == 'error')['fields']
-        assert f'the program that holds it (pid {pid}) does not answer' == told['reason'], told
+        assert f'the program that has it open (pid {pid}) does not answer' == told['reason'], told
     with Board('udp://127.0.0.1:0') as board:
         with_a_stopped_holder(board.host_url.replace('?listen=0', f'?listen={free_port()}'), is_told)
 
@@ -216,7 +216,7 @@ def test_stop_and_control_work_at_the_limit_of_sharing_programs(folder):
             other.send(b'h3')
             assert other.recv(2000) == b'w3'
         told = run('monitor', board.host_url, '--duration', '0.5')
-        assert '16 programs share it already, as many as may; end one of them' in told.stdout + told.stderr, told
+        assert '16 programs share it already, which is the limit; end one of these' in told.stdout + told.stderr, told
         stopped = run('stop', board.host_url)
         assert stopped.returncode == 0, stopped
         sent = run('send', board.host_url, 'E:CLEAR')
@@ -230,7 +230,7 @@ def test_a_refusal_names_a_suspended_controlling_program(board):
         try:
             refused = run('send', board.host_url, 'O:1,1,1')
             assert refused.returncode != 0
-            assert f'controlled by r4 (pid {host.process.pid}), which is stopped; let it go on' in refused.stderr, refused
+            assert f'controlled by r4 (pid {host.process.pid}), which is stopped; continue that program' in refused.stderr, refused
         finally:
             host.signal(signal.SIGCONT)
 

@@ -334,7 +334,7 @@ def test_bench_measures_the_link(board):
 
 def test_bench_fails_if_no_board_is_heard():
     result = run('bench', 'udp://127.0.0.1:9?listen=0', timeout=PATIENCE_S)
-    assert result.returncode == 3 and 'nothing was heard' in result.stderr
+    assert result.returncode == 3 and 'nothing was received' in result.stderr
 
 
 def test_a_board_ends_after_its_duration_or_at_a_signal():

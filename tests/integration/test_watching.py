@@ -85,7 +85,7 @@ def test_a_fifth_watcher_is_refused_until_another_watcher_ends(board):
         for each in watchers:
             each.next(is_state)
         refused = run('monitor', board.host_url, '--duration', '1')
-        assert 'as many programs watch the board as it serves' in refused.stdout + refused.stderr, refused
+        assert 'the board has reached its limit of watchers' in refused.stdout + refused.stderr, refused
         assert watchers.pop().end() == 0
         with watch(board.host_url) as next_one:
             next_one.next(is_state)

@@ -172,7 +172,7 @@ def test_a_stop_while_control_is_given_back_is_not_lost():
 
 def test_a_stop_under_way_while_control_is_taken_is_not_lost():
     with one_board() as (board, web), Page(web) as page, Page(web) as watcher:
-        page.next('board', lambda each: each['why'] == 'nobody controls it')
+        page.next('board', lambda each: each['why'] == 'no host controls the board')
         board.signal(signal.SIGSTOP)  # so that the board does not confirm the stop before control is taken
         watcher.say(type='stop', request=1)
         assert page.control()['you']
@@ -234,7 +234,7 @@ def test_only_a_controlling_page_starts_a_recording_and_ends_it(tmp_path):
     with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as first, Page(web) as second:
         second.say(type='record', on=True)
         refused = second.next('recording', lambda each: each['why'])
-        assert 'no control' in refused['why'] and refused['path'] is None and not refused['you']
+        assert 'not in control' in refused['why'] and refused['path'] is None and not refused['you']
         assert first.control()['you']
         first.say(type='record', on=True)
         path = second.next('recording', lambda each: each['path'])['path']
@@ -271,7 +271,7 @@ def test_a_refused_control_request_is_reported_only_to_its_page():
             for _ in range(20):
                 assert 'another browser' in other.next('control', lambda each: each['why'])['why']
         page.say(type='control', want=False)
-        assert page.next('control')['why'] == 'it was given back'
+        assert page.next('control')['why'] == 'control was given back'
 
 
 def test_the_option_page_serves_the_files_of_a_folder(tmp_path):

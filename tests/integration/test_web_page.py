@@ -159,7 +159,7 @@ def test_plots_keep_spikes_and_show_gaps(browser):
 def test_plots_can_be_paused_zoomed_and_read(browser):
     with one_board(browser) as (_, _, page):
         page.click('#pause')
-        page.until_text('#pause', 'Go on')
+        page.until_text('#pause', 'Continue')
         before = page.evaluate(PICTURES)
         seen = page.evaluate('r4_measured.states')
         page.until(f'r4_measured.states > {seen} + 20')  # the paused page stores the new states
@@ -172,7 +172,7 @@ def test_plots_can_be_paused_zoomed_and_read(browser):
                             '(document.querySelector(".area").getBoundingClientRect())')
         middle = box[1] + box[3] / 2
         page.do('drag', **{'from': [box[0] + 0.5 * box[2], middle], 'to': [box[0] + 0.98 * box[2], middle]})
-        page.until_text('#pause', 'Go on')
+        page.until_text('#pause', 'Continue')
         page.until('/^[0-9:.]{12}$/.test(document.querySelector("figcaption > .hint").textContent)')
         assert 23 < float(page.text('.readout b')) < 26
         page.evaluate('document.querySelector("#fields-body input").focus()')
@@ -211,7 +211,7 @@ def test_messages_do_not_move_the_buttons(browser, width):
         before = places()
         for part in ('#holder', '#control', '.card .head .hint', '.card .why', '.card output'):
             for told in ('Take control', 'Give control back') if part == '#control' else (
-                    '', 'You control', 'Nobody controls; you watch: nothing was heard of the browser for 500 ms'):
+                    '', 'You control', 'No browser is in control; you watch: the browser in control was silent for 500 ms'):
                 assert places(part, told) == before, (part, told)
 
 
@@ -290,7 +290,7 @@ def test_the_page_reports_a_lost_server_or_board_and_reconnects(browser):
                 with Web(board.host_url, listen=f'127.0.0.1:{port}'):
                     page.until(f'document.querySelector("#alarm").hidden && r4_measured.states > {seen}')
                     page.until_text('.card .state', 'Safe')
-                    assert page.text('#holder').startswith('Nobody controls')  # control does not return by itself
+                    assert page.text('#holder').startswith('No browser is in control')  # control does not return by itself
 
 
 def test_a_closed_or_hidden_page_makes_its_board_safe(browser):

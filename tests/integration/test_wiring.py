@@ -163,7 +163,7 @@ def test_a_new_board_is_safe_until_its_owner_confirms_the_plan(cable):
         assert run('send', serial, 'O:358,1,1').returncode == 3, 'from the next start on'
         restart(board)
         assert run('send', serial, 'O:358,1,1').returncode == 0
-        assert 'nothing to confirm' in run('wiring', 'confirm', serial).stdout
+        assert 'a confirmation is not needed' in run('wiring', 'confirm', serial).stdout
         assert run('wiring', 'diff', 'plan', serial).returncode == 0
 
 

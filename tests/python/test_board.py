@@ -174,7 +174,7 @@ def test_a_state_has_every_field_that_the_board_reports(board):
 
 def test_a_field_that_the_board_has_not_reported_is_an_error(board):
     state = board.next_state()
-    with pytest.raises(AttributeError, match=re.escape("enc2: the board has not reported this field; ask for it: "
+    with pytest.raises(AttributeError, match=re.escape("enc2: the board has not reported this field; request the field: "
                                                        "fields('DEFAULT,ENC2')")):
         state.enc2
     with pytest.raises(AttributeError, match='relays: '):

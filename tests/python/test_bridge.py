@@ -27,7 +27,7 @@ def test_a_host_drives_the_board_behind_a_bridge():
 def test_a_bridge_refuses_urls_that_it_cannot_join():
     with pytest.raises(r4link.UsageError, match='both sides of the bridge are the same'):
         r4link.Bridge('can://can0', 'can://can0?node=1')
-    with pytest.raises(r4link.UsageError, match='everyone who reaches it'):
+    with pytest.raises(r4link.UsageError, match='every program that reaches'):
         r4link.Bridge('udp://0.0.0.0:0', 'serial:///dev/r4-is-not-there')
     r4link.Bridge('udp://0.0.0.0:0', 'serial:///dev/r4-is-not-there', open=True).close()
     with r4link.Bridge('udp://127.0.0.1:0', 'sim:') as bridge:

@@ -42,7 +42,7 @@ def test_copies_of_a_command_keep_its_text_and_description(text, words):
 
 
 @pytest.mark.parametrize('text, fault', [
-    ('', 'no such command'), ('V:1,1', 'no such command'), ('O:1,1', 'form'), ('O:5000,1,1', 'range'),
+    ('', 'this is not a command'), ('V:1,1', 'this is not a command'), ('O:1,1', 'form'), ('O:5000,1,1', 'range'),
     ('O:1,1,5', 'channel'), ('O:1,1,1;O:1,1,2', 'O:1,1,1'),
 ])
 def test_a_wrong_text_is_refused_with_a_reason(text, fault):

@@ -84,9 +84,9 @@ def test_an_answer_may_be_an_action_and_must_fit(sim):
     with r4link.Board(sim.url) as board:
         assert r4link.Commissioning(board, Watching(sim, {'which': Action.SKIP})).run('osmc 1').status == 'skipped'
         assert r4link.Commissioning(board, Watching(sim, {'which': Action.LEAVE})).run('osmc 1') is None
-        with pytest.raises(r4link.UsageError, match="osmc 1: 7: it does not answer 'which'"):
+        with pytest.raises(r4link.UsageError, match="osmc 1: 7: this is not a valid answer to 'which'"):
             r4link.Commissioning(board, Watching(sim, {'which': 7})).run('osmc 1')
-        with pytest.raises(r4link.UsageError, match='no such check'):
+        with pytest.raises(r4link.UsageError, match='this is not a check'):
             r4link.Commissioning(board, Watching(sim, {})).run('osmc 9')
         with pytest.raises(r4link.DataError, match='not JSON'):
             r4link.Commissioning(board, Watching(sim, {}), resume='{')

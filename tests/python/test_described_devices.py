@@ -29,7 +29,7 @@ def test_a_shipped_device_is_set_up_and_decoded(sim, board, wait):
     readings = imu.readings(state)
     assert math.isclose(readings['quat_z'].number, math.sqrt(0.5), abs_tol=1e-4)
     assert readings['accel_z'].errors == 0 and 0 <= state.t_ms - readings['accel_z'].t_ms <= 1000
-    with pytest.raises(r4link.UsageError, match='it has no value yaw'):
+    with pytest.raises(r4link.UsageError, match='the device has no value yaw'):
         imu.reading(state, 'yaw')
 
 
@@ -74,7 +74,7 @@ def test_a_slot_in_use_is_refused_until_its_poll_is_off(sim, board, wait):
     sim.happen('device as5600 on')
     power, angle = r4link.Device('ina219@0x40'), r4link.Device('as5600')
     board.attach(power)
-    with pytest.raises(r4link.UsageError, match=r'as5600@0x36:1: ina219@0x40 has slot 1; name a free one, as5600@0x36:3'):
+    with pytest.raises(r4link.UsageError, match=r'as5600@0x36:1: ina219@0x40 has slot 1; use a free slot, as5600@0x36:3'):
         board.attach(angle)
     board.attach(power)
     for slot in (1, 2):
@@ -84,13 +84,13 @@ def test_a_slot_in_use_is_refused_until_its_poll_is_off(sim, board, wait):
 
 
 def test_wrong_descriptions_and_devices_are_refused(board, tmp_path):
-    with pytest.raises(r4link.DataError, match='line 4: it ends behind the 2 bytes of its poll'):
+    with pytest.raises(r4link.DataError, match='line 4: the value ends after the 2 bytes of its poll'):
         r4link.Device.parse(MINE.replace('bus 0', 'bus 1'))
-    with pytest.raises(r4link.UsageError, match='no such device is described here'):
+    with pytest.raises(r4link.UsageError, match='a description of this device does not exist'):
         r4link.Device('bno056')
     with pytest.raises(r4link.OpenError):
         r4link.Device(str(tmp_path / 'none.device'))
-    with pytest.raises(r4link.RefusedError, match='it is another device'):
+    with pytest.raises(r4link.RefusedError, match='this is another device'):
         board.attach(r4link.Device('icm20948@0x68'))
     assert devices.shipped() == ['as5600', 'bno055', 'icm20948', 'ina219', 'mpu6050', 'vl53l0x']
 

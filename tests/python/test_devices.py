@@ -173,7 +173,7 @@ def test_a_group_may_contain_voltages(sim, board, wait):
     wait(lambda: board.state.dac1 == 5)
     with pytest.raises(r4link.UsageError, match='range'):
         Setpoints(Command.dac(1, millivolts=3301))
-    with pytest.raises(r4link.UsageError, match='same channel'):
+    with pytest.raises(r4link.UsageError, match='its channel'):
         Setpoints(Command.dac(1, millivolts=1), Command.dac(1, millivolts=2))
     board.stop()
     with pytest.raises(r4link.RefusedError):

@@ -56,7 +56,7 @@ def test_a_controlled_board_names_its_holder(tmp_path):
 def test_a_port_without_a_board_has_a_reason(tmp_path):
     port, = [each for each in r4link.discover(udp=False, can=False, serial_ports=[f'{tmp_path}/none']).ports
              if each.path == f'{tmp_path}/none']
-    assert port.asked and not port.is_r4 and 'no such device' in port.trouble
+    assert port.asked and not port.is_r4 and 'does not exist' in port.trouble
 
 
 def test_other_tasks_run_during_a_search():

@@ -49,11 +49,11 @@ def test_a_copy_of_a_member_is_the_member(member):
 
 
 def test_a_text_that_is_not_a_member_is_refused(sim):
-    with pytest.raises(r4link.UsageError, match="'pilot': it is not a valid BoardRole; give 'control' or 'watch'"):
+    with pytest.raises(r4link.UsageError, match="'pilot': this is not a valid BoardRole; give 'control' or 'watch'"):
         r4link.Board('sim:', role='pilot')
-    with pytest.raises(ValueError, match='it is not a valid SafeReason'):
+    with pytest.raises(ValueError, match='this is not a valid SafeReason'):
         make_state(1, safe='reason')
-    with TestBoard(sim.url) as board, pytest.raises(r4link.UsageError, match='it is not a valid SafeReason'):
+    with TestBoard(sim.url) as board, pytest.raises(r4link.UsageError, match='this is not a valid SafeReason'):
         board.expect_safe('handel')
 
 

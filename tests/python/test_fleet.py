@@ -68,9 +68,9 @@ def test_a_fleet_records_into_one_file(fleet, tmp_path):
 
 
 def test_a_fleet_refuses_wrong_options(monkeypatch, tmp_path):
-    with pytest.raises(r4link.UsageError, match="'drive': it is not a valid BoardRole"):
+    with pytest.raises(r4link.UsageError, match="'drive': this is not a valid BoardRole"):
         r4link.Fleet('sim:', role='drive')
-    with pytest.raises(r4link.UsageError, match='for a Board alone'):
+    with pytest.raises(r4link.UsageError, match='only for a Board'):
         r4link.Fleet(r4link.with_link('sim:', 'loss=5%'))
     for wrong in (['sim:', 'sim:?node=2'],), (None,), (b'sim:',):
         with pytest.raises(r4link.UsageError, match=r'write r4link.Fleet\(\*urls\)'):

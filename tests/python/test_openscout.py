@@ -22,7 +22,7 @@ def test_the_tests_of_the_example_pass():
 
 def test_the_example_drives_its_model():
     ended = run('openscout.py', 'model', '--course', '0.5,0')
-    assert (ended.returncode, ended.stdout) == (0, 'armed: it drives\nthe step has ended it\n'), ended.stderr
+    assert (ended.returncode, ended.stdout) == (0, 'armed: it drives\nthe step function ended the loop\n'), ended.stderr
 
 
 def test_the_example_reports_wrong_arguments():

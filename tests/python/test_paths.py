@@ -121,11 +121,11 @@ def test_a_fleet_has_boards_with_several_paths(paths):
 
 
 def test_invalid_combinations_of_paths_are_refused(sim):
-    with pytest.raises(r4link.UsageError, match='a board of its own'):
+    with pytest.raises(r4link.UsageError, match='a separate board'):
         r4link.Board([sim.url, 'udp://127.0.0.1'])
-    with pytest.raises(r4link.UsageError, match='one to 4 are possible'):
+    with pytest.raises(r4link.UsageError, match='one to 4 paths are possible'):
         r4link.Board([f'udp://127.0.0.{i}' for i in range(1, 6)])
-    with pytest.raises(r4link.UsageError, match='a board of one path'):
+    with pytest.raises(r4link.UsageError, match='only with one path'):
         r4link.Board([r4link.with_link('udp://127.0.0.1', 'loss=5%'), 'serial:auto'])
     with pytest.raises(r4link.UsageError):
         r4link.Board([])

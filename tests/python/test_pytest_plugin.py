@@ -90,7 +90,7 @@ def test_can(request, tmp_path):
     assert '4 failed, 1 passed' in ended.stdout, ended.stdout
     assert re.search(r"@pytest.mark.r4\(link='loss=2%,delay=5ms±5,seed=\d+'\)", ended.stdout)
     for words in ('osmc1 is Drive(pwm=0, direction=0), not 358 (link active, reason none; State(pnum=',
-                  'the board has no such field; see r4link.FIELDS',
+                  'this is not a state field; see r4link.FIELDS',
                   'after 0.05 s the board is not safe (stop): the link is active, its reason none'):
         assert words in ended.stdout.replace('\n', ' '), ended.stdout
 
@@ -99,7 +99,7 @@ def test_a_missing_r4_command_is_reported_with_a_fix(tmp_path):
     (tmp_path / 'test_it.py').write_text('def test_it(r4_board): pass\n')
     env = {'R4': '', 'PATH': str(tmp_path)}
     ended = run_pytest('test_it.py', '--r4-transport', 'udp', cwd=tmp_path, **env)
-    assert 'the command r4: it is not on PATH; set R4=FILE' in ended.stdout, ended.stdout
+    assert 'the command r4: the command is not on PATH; set R4=FILE' in ended.stdout, ended.stdout
 
 
 def test_xdist_workers_use_different_nodes_of_a_bus(monkeypatch):

@@ -87,7 +87,7 @@ def test_opening_a_board_raises_the_error_of_the_first_open(forward):
     forward.failure = ValueError('no modem')
     with pytest.raises(r4link.OpenError) as raised:
         r4link.Board(forward)
-    assert raised.value.thing == 'Forward' and raised.value.reason == 'it raised ValueError: no modem'
+    assert raised.value.thing == 'Forward' and raised.value.reason == 'the transport raised ValueError: no modem'
     assert forward.closings == 0
     forward.failure = None
     with r4link.Board(forward) as board:
@@ -108,7 +108,7 @@ def test_a_send_that_raises_is_reported_and_the_path_recovers(forward, wait):
         board.wait_active()
         forward.failure = OSError(19, 'No such device')
         wait(lambda: any(event.kind is r4link.EventKind.DOWN for event in events))
-        assert events[-1].reason == 'it raised OSError: [Errno 19] No such device'
+        assert events[-1].reason == 'the transport raised OSError: [Errno 19] No such device'
         wait(lambda: board.link.state is not r4link.LinkState.ACTIVE)
         forward.failure = None
         board.wait_active(5)
@@ -272,7 +272,7 @@ def test_a_failed_can_bus_is_reported_and_recovers(bus, wait, monkeypatch, metho
         with monkeypatch.context() as unplugged:
             unplugged.setattr(bus, method, fail)
             wait(lambda: any(event.kind is r4link.EventKind.DOWN for event in events))
-            assert events[-1].reason == 'it raised OSError: adapter unplugged'
+            assert events[-1].reason == 'the transport raised OSError: adapter unplugged'
         wait(lambda: events[-1].kind is r4link.EventKind.UP)
 
 

@@ -98,14 +98,14 @@ TEST(UrlPattern, RefusesAnInvalidPatternWithTheReason) {
            Refused{"udp://arm-{1,}", "'' is neither a number nor a range"},
            Refused{"udp://arm-{1-2-3}", "'1-2-3' is neither a number nor a range"},
            Refused{"udp://arm-{+1-2}", "'+1-2' is neither a number nor a range"},
-           Refused{"udp://arm-{1", "has a brace without the other one"},
-           Refused{"udp://arm-1}{2", "has a brace without the other one"},
+           Refused{"udp://arm-{1", "has a brace without its partner"},
+           Refused{"udp://arm-1}{2", "has a brace without its partner"},
            Refused{"udp://arm-{{1}}", "'{1' is neither a number nor a range"},
            Refused{"udp://10.{0-255}.{0-255}.1", "stands for more than 10000 boards"},
            Refused{"udp://arm-{0-4294967295}", "stands for more than 10000 boards"},
            Refused{"udp://127.0.0.1:65535-65536", "'65536' is not a port"},
-           Refused{"can://can0?node=0-7+serial:auto", "its paths lead to 8 and to 1 boards"},
-           Refused{"serial:auto+udp://arm-{1-3}", "its paths lead to 1 and to 3 boards"},
+           Refused{"can://can0?node=0-7+serial:auto", "the paths lead to 8 and to 1 boards"},
+           Refused{"serial:auto+udp://arm-{1-3}", "the paths lead to 1 and to 3 boards"},
        }) {
     const Problem problem = problem_of([&] { expand_urls(each.pattern); });
     EXPECT_EQ(problem.kind, ErrorKind::usage) << each.pattern;

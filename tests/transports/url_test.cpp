@@ -88,7 +88,7 @@ const std::vector<Refused> refused = {
     {"udp://host?listen", "'listen' is not KEY=VALUE"},
     {"udp://host?=1", "'=1' is not KEY=VALUE"},
     {"udp://host?listen=1&", "'' is not KEY=VALUE"},
-    {"udp://host?listen=1&listen=2", "'listen' is there twice"},
+    {"udp://host?listen=1&listen=2", "'listen' is given twice"},
     {"pty:/tmp/%", "'%' is not a percent-encoded"},
     {"pty:/tmp/%4", "'%4' is not a percent-encoded"},
     {"pty:/tmp/%zz", "'%zz' is not a percent-encoded"},

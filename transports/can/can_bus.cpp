@@ -30,8 +30,8 @@ constexpr std::chrono::milliseconds most_awake{10};
 Problem filter_problem(Problem problem) {
   if (problem.fix.empty()) {
     problem.reason =
-        "the kernel does not take the filters for what is to be heard: " + problem.reason;
-    problem.fix = "use fewer nodes of one interface in one program; the kernel takes 512 filters";
+        "the kernel does not accept the CAN filters of this program: " + problem.reason;
+    problem.fix = "use fewer nodes of one interface in one program; the kernel accepts 512 filters";
   }
   return problem;
 }
@@ -235,7 +235,7 @@ void CanBus::look_at_controller() {
 void CanBus::go_bus_off() {
   go_down({ErrorKind::open, medium_->name(), "the controller is bus-off: too many errors",
            fmt::format("{}, then: ip link set {} type can restart (slcan: down, and up); with "
-                       "restart-ms 100 it does so by itself",
+                       "restart-ms 100 the interface restarts by itself",
                        check_the_wire, medium_->name().substr(medium_->name().rfind('/') + 1))},
           false);
 }
@@ -283,7 +283,7 @@ void CanBus::come_up() {
   Problem problem{ErrorKind::open, medium_->name(), "", ""};
   if (before == Trouble::down) return tell({CarrierEvent::Kind::up, std::move(problem)});
   if (before == Trouble::none) return;
-  problem.reason = "the trouble is over";
+  problem.reason = "the errors have stopped";
   tell({CarrierEvent::Kind::warning, std::move(problem)});
 }
 

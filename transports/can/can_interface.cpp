@@ -90,8 +90,8 @@ CanInterface can_interface(const std::string& name) {
 
 const std::string& can_interface_of(const Url& url) {
   if (url.scheme() != "can" || url.host().empty() || !url.path().empty() || url.port()) {
-    throw Error(ErrorKind::usage, url.text(), "it is not can://INTERFACE",
-                "write it as in can://can0");
+    throw Error(ErrorKind::usage, url.text(), "the URL is not can://INTERFACE",
+                "write a URL such as can://can0");
   }
   return url.host();
 }

@@ -122,15 +122,15 @@ void CanSocket::open() {
   if (!probe) fail(interface_, errno);
   const CanInterface state = can_interface(interface_);
   if (!state.unknown.empty()) {
-    throw Error(
-        ErrorKind::open, name_, "the system does not tell about it: netlink: " + state.unknown,
-        "let this program have netlink sockets (of a service: RestrictAddressFamilies= with "
-        "AF_NETLINK) and enough open files (ulimit -n)");
+    throw Error(ErrorKind::open, name_,
+                "the state of the interface is unknown: netlink: " + state.unknown,
+                "allow netlink sockets for this program (in a service: RestrictAddressFamilies= "
+                "with AF_NETLINK) and enough open files (ulimit -n)");
   }
   if (!state.exists) fail(interface_, ENODEV);
   if (!state.is_can) {
     throw Error(ErrorKind::usage, name_, interface_ + " is not a CAN interface",
-                "r4 list shows those that are there");
+                "choose a CAN interface; r4 list shows them");
   }
   if (!state.up) fail(interface_, ENETDOWN);
   if (fd_ && !state.fd) {

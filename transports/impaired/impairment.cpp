@@ -35,7 +35,7 @@ bool take(std::string_view& text, std::string_view beginning) {
 
 double share(std::string_view part, std::string_view text) {
   const double percent = number(part, text, 100);
-  if (text != "%") refuse(part, "is not a share in percent");
+  if (text != "%") refuse(part, "is not a valid share: expected percent, such as 5%");
   return percent / 100;
 }
 
@@ -68,10 +68,11 @@ Impairment Impairment::parse(std::string_view text) {
       result.delay = duration(part, value, "ms");
       if (take(value, "±") || take(value, "+-")) result.jitter = duration(part, value, "ms");
       if (!value.empty()) refuse(part, "is not a valid delay");
-      if (result.jitter > result.delay) refuse(part, "varies by more than it is");
+      if (result.jitter > result.delay)
+        refuse(part, "is not a valid delay: the variation is larger than the delay");
     } else if (key == "cut") {
       result.cut_at = duration(part, value, "s");
-      if (!take(value, "+")) refuse(part, "does not say for how long");
+      if (!take(value, "+")) refuse(part, "is not a valid cut: the duration is missing");
       result.cut_for = duration(part, value, "s");
       if (!value.empty()) refuse(part, "is not a valid cut");
     } else if (key == "seed") {

@@ -68,10 +68,10 @@ struct FrameOutbox {
 CanFrame frame_of(std::uint32_t id, bool extended, bool fd, std::string_view data) {
   CanFrame frame{};
   if (data.size() > (fd ? max_fd_size : max_classic_size)) {
-    throw Error(
-        ErrorKind::usage, fmt::format("a CAN frame of {} bytes", data.size()),
-        fmt::format("its data are longer than {} bytes", fd ? max_fd_size : max_classic_size),
-        fd ? "" : "pass fd = true for a CAN FD frame");
+    throw Error(ErrorKind::usage, fmt::format("a CAN frame of {} bytes", data.size()),
+                fmt::format("the data of the frame are longer than {} bytes",
+                            fd ? max_fd_size : max_classic_size),
+                fd ? "" : "pass fd = true for a CAN FD frame");
   }
   frame.id = id;
   frame.extended = extended;

@@ -40,8 +40,8 @@ struct DatagramCalls {
     transport->open([received = std::move(received)](std::string_view datagram) {
       if (datagram.size() > max_datagram) {
         throw Error(ErrorKind::usage, fmt::format("a datagram of {} bytes", datagram.size()),
-                    fmt::format("it is longer than {} bytes", max_datagram),
-                    "hand over one whole datagram at a time");
+                    fmt::format("the datagram is longer than {} bytes", max_datagram),
+                    "pass one whole datagram at a time");
       }
       received(std::string(datagram));
     });

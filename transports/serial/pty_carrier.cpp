@@ -70,8 +70,8 @@ PtyCarrier::PtyCarrier(asio::io_context& io, Url url)
     : LineCarrier(io, url.text(), look_for_host), url_(std::move(url)) {
   url_.allow_only("");
   if (!url_.host().empty()) {
-    throw Error(ErrorKind::usage, url_.text(), "it is not pty: or pty:PATH",
-                "write it as in pty:/tmp/r4");
+    throw Error(ErrorKind::usage, url_.text(), "the URL is not pty: or pty:PATH",
+                "write a URL such as pty:/tmp/r4");
   }
 }
 
@@ -94,8 +94,8 @@ void PtyCarrier::open(Handler& handler) {
     const auto problem = out_of_resources(url_.text(), error == ENOSPC ? 0 : error);
     if (problem) throw Error(*problem);
     throw Error(ErrorKind::open, url_.text(),
-                std::string("no pseudo-terminal is to be had: ") + std::strerror(error),
-                "see that /dev/ptmx and /dev/pts are there");
+                std::string("a pseudo-terminal cannot be opened: ") + std::strerror(error),
+                "check that /dev/ptmx and /dev/pts exist");
   }
   device_ = device.data();
   try {
@@ -117,8 +117,8 @@ void PtyCarrier::make_link() {
   std::error_code error;
   const fs::file_status status = fs::symlink_status(link, error);
   if (fs::exists(status) && !is_our_kind(link)) {
-    throw Error(ErrorKind::open, url_.text(), link.string() + " is there and leads to no pty",
-                "give another path, or remove it");
+    throw Error(ErrorKind::open, url_.text(), link.string() + " exists and is not a link to a pty",
+                "give another path, or remove that file");
   }
   // The new link replaces an old link in one step, so the path always has a link.
   const fs::path fresh = fmt::format("{}.{}", link.string(), ::getpid());
@@ -131,7 +131,7 @@ void PtyCarrier::make_link() {
   if (error) {
     throw Error(error == std::errc::permission_denied ? ErrorKind::permission : ErrorKind::open,
                 url_.text(), "the link cannot be made: " + error.message(),
-                "give a path in a folder of yours");
+                "give a path in a folder that you may write to");
   }
   linked_ = true;
 }
@@ -179,8 +179,8 @@ void PtyCarrier::look() {
 }
 
 Problem PtyCarrier::on_lost(int) {
-  return {ErrorKind::open, name_, "no host has it open",
-          "open it at the host: serial://" + device_};
+  return {ErrorKind::open, name_, "a host has not opened the pty",
+          "open this URL at the host: serial://" + device_};
 }
 
 void PtyCarrier::before_state() {
@@ -203,8 +203,8 @@ void PtyCarrier::before_state() {
 std::unique_ptr<Carrier> make_pty_carrier(asio::io_context& io, const Url& url, Role role,
                                           const Claim&) {
   if (role == Role::host) {
-    throw Error(ErrorKind::usage, url.text(), "pty is the board's end",
-                "a host opens the other end: serial:///dev/pts/N");
+    throw Error(ErrorKind::usage, url.text(), "pty: is the board's end",
+                "open the other end at the host: serial:///dev/pts/N");
   }
   return std::make_unique<PtyCarrier>(io, url);
 }

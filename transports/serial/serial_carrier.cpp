@@ -36,7 +36,7 @@ std::string find_device(const Url& url) {
                 number.empty()
                     ? "no R4 board is connected by USB"
                     : fmt::format("no device with serial number '{}' is connected", number),
-                "connect the board and switch it on; r4 list shows the ports");
+                "connect the board and switch it on; r4 list shows the serial ports");
   }
   if (ports.size() > 1) {
     std::string list;
@@ -84,9 +84,10 @@ SerialCarrier::SerialCarrier(asio::io_context& io, Url url, Claim claim)
   const bool by_number = !url_.get("sn").value_or("").empty();
   const bool by_path = url_.path() == "auto" || url_.path().find('/') != std::string::npos;
   if (!url_.host().empty() || by_number == by_path || (by_number && !url_.path().empty())) {
-    throw Error(ErrorKind::usage, url_.text(), "it names no serial port",
-                url_.host().empty() ? "use serial:auto, serial:///dev/NAME or serial:?sn=SERIAL"
-                                    : "a path has three slashes: serial:///dev/" + url_.host());
+    throw Error(ErrorKind::usage, url_.text(), "the URL does not name a serial port",
+                url_.host().empty()
+                    ? "use serial:auto, serial:///dev/NAME or serial:?sn=SERIAL"
+                    : "write a path with three slashes: serial:///dev/" + url_.host());
   }
 }
 
@@ -130,7 +131,7 @@ std::string SerialCarrier::find_again() const {
     }
     if (path.empty() || port.path == device_.path) path = port.path;
   }
-  if (path.empty()) throw Error(ErrorKind::open, name_, "it is not connected");
+  if (path.empty()) throw Error(ErrorKind::open, name_, "the device is not connected");
   return path;
 }
 
@@ -151,7 +152,7 @@ Problem SerialCarrier::on_lost(int error) {
           error == 0
               ? "unplugged, or closed at the other end"
               : fmt::format("unplugged, or closed at the other end ({})", std::strerror(error)),
-          "plug it in again; it is opened by itself"};
+          "plug it in again; the port is then opened automatically"};
 }
 
 void SerialCarrier::look() {

@@ -26,7 +26,8 @@ std::string ports_in_words() {
     list += (list.empty() ? "" : ", ") + port.path;
     if (port.is_r4) list += " (R4)";
   }
-  return list.empty() ? "this machine has no serial ports now" : "ports of this machine: " + list;
+  return list.empty() ? "this computer has no serial ports now"
+                      : "serial ports of this computer: " + list;
 }
 
 [[noreturn]] void fail(const std::string& path, int error) {
@@ -35,7 +36,7 @@ std::string ports_in_words() {
     case ENOENT:
     case ENODEV:
     case ENXIO:
-      throw Error(ErrorKind::open, path, "there is no such device",
+      throw Error(ErrorKind::open, path, "the device does not exist",
                   "connect the board; " + ports_in_words());
     case EACCES:
     case EPERM:
@@ -44,20 +45,20 @@ std::string ports_in_words() {
                   "again");
     case EBUSY:
     case EWOULDBLOCK:
-      throw Error(ErrorKind::open, path, "it is in use by another program",
+      throw Error(ErrorKind::open, path, "the port is in use by another program",
                   "end that program; fuser -v " + path + " names it");
     case ENOTTY:
     case EINVAL:
     case EISDIR:
-      throw Error(ErrorKind::open, path, "it is not a serial port", ports_in_words());
+      throw Error(ErrorKind::open, path, "this file is not a serial port", ports_in_words());
     default:
       throw Error(ErrorKind::open, path, std::strerror(error), "unplug it and plug it in again");
   }
 }
 
 [[noreturn]] void refuse_baud(const std::string& path, unsigned baud) {
-  throw Error(ErrorKind::usage, path, fmt::format("it does not do {} baud", baud),
-              "the board's rate is 1000000; use an adapter that has it");
+  throw Error(ErrorKind::usage, path, fmt::format("the port does not support {} baud", baud),
+              "use an adapter that supports the board's rate, 1000000 baud");
 }
 
 FileDescriptor duplicate(int descriptor) {

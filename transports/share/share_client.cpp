@@ -38,11 +38,11 @@ void ShareClient::receive() {
   const auto take = [this](const std::optional<ShareMessage>& message) {
     silence_ = 0;
     if (message) return owner_.on_message(*message);
-    owner_.on_no_help({ErrorKind::open, "",
-                       fmt::format("the program that holds it (pid {}) is of another version of "
-                                   "R4 link",
-                                   process_),
-                       "end it, or use the same version for both"});
+    owner_.on_no_help(
+        {ErrorKind::open, "",
+         fmt::format("the program that has it open (pid {}) uses another version of R4 link",
+                     process_),
+         "end that program, or use the same version in both programs"});
   };
   const Received received = receive_messages(connection_, most_at_once, take);
   if (received == Received::end) {
@@ -68,8 +68,8 @@ void ShareClient::look_for_answer() {
 Problem ShareClient::silence() const {
   const std::string pid = process_ == 0 ? "" : fmt::format(" (pid {})", process_);
   const std::string resume = process_ == 0 ? "fg" : fmt::format("kill -CONT {}", process_);
-  return {ErrorKind::open, "", fmt::format("the program that holds it{} does not answer", pid),
-          fmt::format("let it go on, if it was stopped ({}), or end it", resume)};
+  return {ErrorKind::open, "", fmt::format("the program that has it open{} does not answer", pid),
+          fmt::format("if that program is stopped, continue it ({}); otherwise end it", resume)};
 }
 
 SendResult ShareClient::send_stop(std::string_view datagram) {

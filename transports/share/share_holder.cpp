@@ -136,8 +136,8 @@ void ShareHolder::on_hello(Sharer& from) {
   if (from.is_served()) return from.tell(Kind::welcome, ShareMessage::version);
   if (served() < most_served) return serve(from);
   const Problem full{ErrorKind::refused, "",
-                     fmt::format("{} programs share it already, as many as may", most_served),
-                     "end one of them; its place is free at once"};
+                     fmt::format("{} programs share it already, which is the limit", most_served),
+                     "end one of these programs; its place is free at once"};
   from.tell(Kind::event, text_of({CarrierEvent::Kind::down, full}));
 }
 

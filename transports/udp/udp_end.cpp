@@ -106,13 +106,13 @@ void UdpEnd::refuse(const asio::error_code& error, const Endpoint& local, const 
                 fmt::format("{} is in use by {}", port, user_of_udp_port(local.port())), fix);
   }
   if (error == asio::error::access_denied) {
-    throw Error(ErrorKind::permission, url_.text, port + " may not be opened: permission denied",
+    throw Error(ErrorKind::permission, url_.text, port + " cannot be opened: permission denied",
                 "use a port from 1024 up");
   }
   throw Error(ErrorKind::open, url_.text,
               fmt::format("{} cannot be opened on {}: {}", port, local.address().to_string(),
                           error.message()),
-              "use an address of this machine, or 0.0.0.0 for all of them");
+              "use an address of this computer, or 0.0.0.0 for all its addresses");
 }
 
 void UdpEnd::close_socket() noexcept {
@@ -256,8 +256,8 @@ void UdpEnd::report() {
   if (refused_error_ != reported_refusal_) {
     reported_refusal_ = refused_error_;
     if (refused_error_ != 0) {
-      warn(fmt::format("the system does not send: {}", std::strerror(refused_error_)),
-           refused_error_ == EPERM ? "let UDP to this address through the firewall" : "");
+      warn(fmt::format("the system refuses to send: {}", std::strerror(refused_error_)),
+           refused_error_ == EPERM ? "allow UDP to this address in the firewall" : "");
     }
   }
   const std::string status = up_ ? "up" : why_down_.reason;

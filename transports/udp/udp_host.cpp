@@ -58,9 +58,9 @@ void UdpHost::bind(const Endpoint& board) {
   if (!url_.local.is_unspecified()) {
     if (url_.local.is_v6() != board.address().is_v6()) {
       throw Error(ErrorKind::usage, url_.text,
-                  fmt::format("{} and the board's address, {}, are of two kinds",
+                  fmt::format("{} and the board's address, {}, are not of the same IP version",
                               url_.local.to_string(), board.address().to_string()),
-                  "give an address of the board's kind, IPv4 or IPv6");
+                  "give an address of the board's IP version, IPv4 or IPv6");
     }
     local.address(url_.local);
   }
@@ -73,11 +73,12 @@ void UdpHost::bind(const Endpoint& board) {
   const asio::error_code error = host_socket_.bind(local, board);
   if (error == asio::error::already_open) {
     close_socket();
-    throw Error(ErrorKind::open, url_.text, "this program has that board open already",
-                "use the one that is open, or ?listen=0 for another host to the board");
+    throw Error(ErrorKind::open, url_.text, "this program has already opened that board",
+                "use the board that is open, or open a second host with ?listen=0");
   }
   if (error) {
-    refuse(error, local, "end that program, or use ?listen=0 to hear the board on any free port");
+    refuse(error, local,
+           "end that program, or use ?listen=0 to receive from the board on any free port");
   }
   const std::uint16_t local_port = socket_.local_endpoint().port();
   const std::string host = url_.search ? board.address().to_string() : url_.host;

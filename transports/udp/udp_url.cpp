@@ -22,7 +22,7 @@ UdpUrl::UdpUrl(const Url& url, Role role)
     port = static_cast<std::uint16_t>(url.get_number("port", 1, 65535, board_port));
     url.allow_only(by_id ? "id port listen" : "port listen");
     if (by_id && (!url.path().empty() || !is_board_id(Text(called)))) {
-      throw Error(ErrorKind::usage, text, "it does not name one board",
+      throw Error(ErrorKind::usage, text, "the URL does not name one board",
                   "write udp:auto, or udp:?id=NAME with a name or id that r4 list shows");
     }
     return;
@@ -30,10 +30,10 @@ UdpUrl::UdpUrl(const Url& url, Role role)
   // A board whose URL names no address listens to programs of this computer only.
   if (role == Role::board && host.empty() && text.find("//") == 4) host = "127.0.0.1";
   if (host.empty() || !url.path().empty()) {
-    throw Error(ErrorKind::usage, text, "it is not udp://HOST or udp://HOST:PORT",
+    throw Error(ErrorKind::usage, text, "the URL is not udp://HOST or udp://HOST:PORT",
                 role == Role::host
-                    ? "write it as in udp://192.168.1.77:2018, or udp:auto, or udp:?id=NAME"
-                    : "write it as in udp://192.168.1.77:2018");
+                    ? "write a URL such as udp://192.168.1.77:2018, or udp:auto, or udp:?id=NAME"
+                    : "write a URL such as udp://192.168.1.77:2018");
   }
   if (role == Role::host) {
     url.allow_only("listen local");
@@ -43,10 +43,11 @@ UdpUrl::UdpUrl(const Url& url, Role role)
     if (from && (error || local.is_unspecified() || local.is_multicast())) {
       throw Error(ErrorKind::usage, text,
                   "'local=" + *from + "' is not an address of this computer",
-                  "write one that `ip -brief address` shows, as in local=192.168.0.7");
+                  "write an address that `ip -brief address` shows, such as local=192.168.0.7");
     }
     if (port == 0) {
-      throw Error(ErrorKind::usage, text, "no board has port 0", "the board's is 2018");
+      throw Error(ErrorKind::usage, text, "0 is not a valid port of a board",
+                  "use the board's port, which is 2018");
     }
     return;
   }
@@ -58,7 +59,7 @@ UdpUrl::UdpUrl(const Url& url, Role role)
   peer_port = parsed.port().value_or(host_port);
   if (peer_host.empty() || peer_port == 0 || !parsed.path().empty()) {
     throw Error(ErrorKind::usage, text, "'peer=" + peer + "' is not HOST or HOST:PORT",
-                "write it as in peer=192.168.1.10:2390");
+                "write a peer such as peer=192.168.1.10:2390");
   }
 }
 

@@ -41,7 +41,7 @@ CommandKind drive_kind(const std::string& name) {
   if (name == "osmc") return CommandKind::osmc;
   if (name == "dhb12") return CommandKind::dhb12;
   if (name == "bldc") return CommandKind::bldc;
-  throw Error(ErrorKind::usage, "drive '" + name + "'", "there is no such output",
+  throw Error(ErrorKind::usage, "drive '" + name + "'", "the output does not exist",
               "give 'osmc', 'dhb12' or 'bldc'");
 }
 

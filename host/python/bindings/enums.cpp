@@ -28,7 +28,7 @@ std::uint8_t PythonEnum::number(py::handle word) const {
   for (std::size_t i = 0; i < members_.size(); ++i) {
     if (members_[i].is(found)) return static_cast<std::uint8_t>(i);
   }
-  throw Error(ErrorKind::usage, py::str(found), "it has no number", "give another value");
+  throw Error(ErrorKind::usage, py::str(found), "this value has no number", "give another value");
 }
 
 py::tuple PythonEnum::members() const {

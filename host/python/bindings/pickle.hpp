@@ -144,7 +144,7 @@ auto pickled(const char* name) {
         Value value = blank<Value>();
         pickle(value);
         if (same && pickle.whole()) return value;
-        throw Error(ErrorKind::data, name, "it was pickled by another version of R4 link",
+        throw Error(ErrorKind::data, name, "the object was pickled by another version of R4 link",
                     "use the same version in all processes");
       });
 }

@@ -38,9 +38,9 @@ class OfThisProcess {
   Value& get() const {
     if (is_here()) return *value_;
     throw Error(Problem{ErrorKind::refused, what_,
-                        "it was opened by the process " + std::to_string(process_) +
-                            ", of which this one is a fork",
-                        "open it here, after the fork", Outcome::closed});
+                        "the process " + std::to_string(process_) +
+                            " opened it, and this process is a fork of that process",
+                        "open the object in this process, after the fork", Outcome::closed});
   }
   Value* operator->() const { return &get(); }
   Value& operator*() const { return get(); }

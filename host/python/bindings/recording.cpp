@@ -124,7 +124,7 @@ class Columns final : public RecordingVisitor {
                                   column_of(*device, values[i], board.measured),
                                   std::vector<double>(board.pnum.size(), not_measured)});
       } else {
-        return add_damage(text + ": more values than the devices of one board have");
+        return add_damage(text + ": one board cannot have so many values of devices");
       }
     }
   }

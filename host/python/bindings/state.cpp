@@ -72,7 +72,8 @@ StateNumbers numbers_from(F field, const py::handle& value) {
     case FieldForm::answer:
     case FieldForm::bus:
     case FieldForm::uart:
-      throw Error(ErrorKind::usage, attribute_of(field), "it cannot be made up", "leave it out");
+      throw Error(ErrorKind::usage, attribute_of(field), "this field cannot be set",
+                  "leave it out");
     default:
       return {1, {static_cast<double>(value.cast<std::int64_t>())}};
   }
@@ -90,12 +91,12 @@ ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) 
     for (char& c : name) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
     const F field = state_field(Text(name));
     if (field == F::count) {
-      throw Error(ErrorKind::usage, key.cast<std::string>(), "there is no such state field",
+      throw Error(ErrorKind::usage, key.cast<std::string>(), "this is not a state field",
                   "give one of r4link.FIELDS");
     }
     if (!set_numbers(state, field, numbers_from(field, value))) {
-      throw Error(ErrorKind::usage, attribute_of(field), "it has no such value",
-                  "give one that docs/reference/protocol.md allows");
+      throw Error(ErrorKind::usage, attribute_of(field), "the field cannot have this value",
+                  "give a value that docs/reference/protocol.md allows");
     }
     state.present.add(field);
     state.reported.add(field);
@@ -112,10 +113,10 @@ bool has_value(const ReceivedState& state, F field) {
 void require(const ReceivedState& state, F field) {
   if (has_value(state, field)) return;
   const Text name = name_of(field);
-  throw py::attribute_error(attribute_of(field) +
-                            ": the board has not reported this field; ask for it: "
-                            "fields('DEFAULT," +
-                            std::string(name.data(), name.size()) + "')");
+  throw py::attribute_error(
+      attribute_of(field) +
+      ": the board has not reported this field; request the field: fields('DEFAULT," +
+      std::string(name.data(), name.size()) + "')");
 }
 
 }  // namespace

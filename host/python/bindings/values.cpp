@@ -9,8 +9,8 @@ namespace {
 
 Direction direction_of(int number) {
   if (number != 0 && number != 1) {
-    throw Error(ErrorKind::usage, "direction " + std::to_string(number), "there is no such one",
-                "give Direction.FORWARD or Direction.REVERSE");
+    throw Error(ErrorKind::usage, "direction " + std::to_string(number),
+                "the direction does not exist", "give Direction.FORWARD or Direction.REVERSE");
   }
   return static_cast<Direction>(number);
 }

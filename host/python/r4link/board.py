@@ -41,7 +41,7 @@ class States:
 
     def __init__(self, board: Board, most: int | None, timeout: float, lossless: bool) -> None:
         if most is not None and most < 1:
-            raise UsageError(f'states(most={most})', 'at least one has to wait', 'give 1 or more')
+            raise UsageError(f'states(most={most})', 'the queue needs room for a state', 'give 1 or more')
         self._board = board._core
         self._states = self._board.states(lossless, most or 0)
         self._timeout_ms = _ms(timeout)
@@ -104,10 +104,12 @@ class Board(AnyBoard[None]):
         own = [each for each in paths if isinstance(each, Transport)]
         urls = [each for each in paths if isinstance(each, str)]
         if len(own) != len(paths) and own:
-            raise UsageError('URLs and transports for one board', 'it takes either', 'give URLs only, or transports only')
+            raise UsageError('URLs and transports for one board', 'a board has URLs or transports, not both',
+                             'give URLs only, or transports only')
         link = next((bad for bad in (getattr(each, 'link', '') for each in urls) if bad), '')
         if link and (len(paths) > 1):
-            raise UsageError(f'a bad link {link}', 'it is for a board of one path', 'open that URL alone')
+            raise UsageError(f'a bad link {link}', 'a bad link is possible only with one path',
+                             'open the URL of the bad link alone')
         self._core = _core.Board(
             '+'.join(urls), transports=own, link=link, role=role, arming=arming, fields=fields,
             key=None if key is None else os.path.expanduser(os.fspath(key)),

@@ -29,7 +29,7 @@ _MOST_S = 24 * 3600.0
 def _ms(seconds: float) -> int:
     """Whole milliseconds, rounded up so that a short timeout is not 0."""
     if math.isnan(seconds):
-        raise UsageError('a time of nan seconds', 'it is not a number', 'give seconds')
+        raise UsageError('a time of nan seconds', 'the time is not a number', 'give seconds')
     return math.ceil(max(-_MOST_S, min(seconds, _MOST_S)) * 1000)
 
 

@@ -144,7 +144,7 @@ class _Asked:
             return 0, False, float(answer), 0
         if kind == 'choice' and answer in choices:
             return 0, False, 0.0, choices.index(str(answer))
-        raise UsageError(f'{check}: {answer!r}', f'it does not answer {topic!r}',
+        raise UsageError(f'{check}: {answer!r}', f'this is not a valid answer to {topic!r}',
                          f'return {"one of " + ", ".join(choices) if choices else kind}, or an Action')
 
     def await_key(self, check: str, text: str, command: str, most: float) -> tuple[int, bool, float, int]:

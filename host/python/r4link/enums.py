@@ -32,7 +32,7 @@ class Word(str, enum.Enum):
     def _missing_(cls, value: object) -> NoReturn:
         from .errors import UsageError  # imported here, because errors.py imports this module
         *first, last = (f"'{each}'" for each in cls)
-        raise UsageError(repr(value), f'it is not a valid {cls.__name__}', f'give {", ".join(first)} or {last}')
+        raise UsageError(repr(value), f'this is not a valid {cls.__name__}', f'give {", ".join(first)} or {last}')
 
 
 class Direction(enum.IntEnum):
@@ -49,10 +49,10 @@ class BoardRole(Word):
 
 class LinkState(Word):
     """Whether board and host hear each other."""
-    CONNECTING = 'connecting', 'the board was not heard yet, or is booting'
+    CONNECTING = 'connecting', 'the board has not sent a datagram yet, or is starting'
     ACTIVE = 'active', 'the board sends its state and reports no reason to be safe'
     SAFE = 'safe', 'the board reports a reason to be safe: all its outputs are off'
-    LOST = 'lost', 'nothing valid came from the board for the timeout'
+    LOST = 'lost', 'valid datagrams have not arrived from the board for the timeout'
 
 
 class SafeReason(Word):
@@ -69,14 +69,14 @@ class SafeReason(Word):
 class LinkCause(Word):
     """Faults of a link, the gravest first."""
     TRANSPORT_DOWN = 'transport down', 'the transport is down: unplugged, or switched off (of several paths: all are)'
-    TWO_BOARDS = 'two boards', 'the paths lead to two boards, and no state is heard'
+    TWO_BOARDS = 'two boards', 'the paths lead to two boards, so states are not accepted'
     WATCHDOG = 'watchdog', 'feed() was not called in time, so no heartbeat or command is sent'
     CALLBACK = 'callback', 'a callback of the program does not return, so no heartbeat or command is sent'
     FOREIGN_FRAMES = 'foreign frames', "another protocol uses the board's command id (CAN)"
     BUSY = 'busy', 'another host controls the board'
     BOARD_HAS_NO_KEY = 'board has no key', 'this program has a key, and the board asks for no signature'
     KEY_NEEDED = 'key needed', 'the board asks for a signature, and this program has no key'
-    KEY_NOT_TAKEN = 'key not taken', "the board does not accept this program's signature, or does not hear it"
+    KEY_NOT_TAKEN = 'key not taken', "the board does not accept or does not receive this program's signature"
     WATCHERS_FULL = 'watchers full', 'the board already sends its state to as many watchers as it can'
     NOT_WATCHABLE = 'not watchable', "the board's firmware sends its state only to the controlling host"
     LATE_FRAMES = 'late frames', "the board's flow control comes too late (CAN)"
@@ -86,9 +86,9 @@ class LinkCause(Word):
 class PathState(Word):
     """The status of one path to a board (docs/how-to/redundancy.md)."""
     DOWN = 'down', 'its transport is down, or could not be opened yet'
-    ASKING = 'asking', 'its transport is up, and the board there has not answered yet who it is'
+    ASKING = 'asking', 'its transport is up, and the board has not reported its identity yet'
     OTHER_BOARD = 'other board', 'it leads to another board: only stops are sent on it'
-    SILENT = 'silent', 'it leads to the board, and nothing came for the timeout'
+    SILENT = 'silent', 'it leads to the board, and datagrams have not arrived for the timeout'
     CARRYING = 'carrying', 'it carries datagrams from the board'
 
 
@@ -126,16 +126,16 @@ class Outcome(Word):
 class Refusal(Word):
     """Why a board refuses a command: the code of its answer (docs/reference/protocol.md)."""
     NONE = 'NONE', 'the board did not refuse the command'
-    UNKNOWN = 'UNKNOWN', 'there is no such command, field or setting'
+    UNKNOWN = 'UNKNOWN', 'the board does not know this command, field or setting'
     FORMAT = 'FORMAT', 'the text does not have the form of the command'
     RANGE = 'RANGE', 'a value is outside its range'
-    CHANNEL = 'CHANNEL', 'there is no such channel'
+    CHANNEL = 'CHANNEL', 'the channel does not exist'
     STALE = 'STALE', 'the command is older than one that was executed, or was delayed for too long'
     DUPLICATE = 'DUPLICATE', 'a command with this packet number was executed already'
     SAFE = 'SAFE', 'the outputs are in the safe state'
     BUSY = 'BUSY', 'another host controls the board'
     AUTH = 'AUTH', 'the command is not signed with a key that the board accepts'
-    FULL = 'FULL', 'what the command needs is in use: try again when that has ended'
+    FULL = 'FULL', 'the resource of the command is in use: try again later'
 
 
 class PostResult(Word):
@@ -181,7 +181,7 @@ class FleetEventKind(Word):
     ARMING = 'arming', 'the board was armed or disarmed: a DisarmCause'
     RESTART = 'restart', 'the board restarted, or this computer slept: None'
     REFUSED = 'refused', 'a posted command was refused: a RefusedPost'
-    MISSED = 'missed', 'events were dropped, because nobody took them: how many'
+    MISSED = 'missed', 'the number of events that were dropped, because the program did not take them'
 
 
 class LoopEnd(Word):

@@ -97,11 +97,11 @@ class Fleet:
         """
         for url in urls:
             if not isinstance(url, str):
-                raise UsageError(f'a fleet of {url!r}', 'each URL is a text of its own',
+                raise UsageError(f'a fleet of {url!r}', 'each URL must be a separate text',
                                  "write r4link.Fleet(*urls); several paths to one board are 'URL+URL'")
             if getattr(url, 'link', ''):
-                raise UsageError(url, 'with_link() is for a Board alone, not for one of a Fleet',
-                                 'open it by a Board, or let the simulated board have the bad link (r4 sim --link)')
+                raise UsageError(url, 'with_link() is only for a Board, not for a board of a Fleet',
+                                 'open the URL with Board, or give the simulated board a bad link (r4 sim --link)')
         self._core = _core.Fleet(list(urls), role=role, arming=arming, fields=fields,
                                  key=None if key is None else os.path.expanduser(os.fspath(key)),
                                  watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
@@ -142,7 +142,7 @@ class Fleet:
             others = f' (and {len(missing) - 1} other boards)' if len(missing) > 1 else ''
             health = self._core.health()[missing[0]]
             state = f'is {health.link.state}' + ('' if health.link.reason is SafeReason.NONE else f', {health.link.reason}')
-            raise RefusedError(health.url, state + others, 'see health(), and that they are on and reached')
+            raise RefusedError(health.url, state + others, 'check health(), and that the boards are on and connected')
 
     def health(self) -> list[BoardHealth]:
         """The health of each board, in the order of the URLs."""

@@ -26,7 +26,8 @@ from .testing import TRANSPORTS, Robot, SimProcess, TestBoard, make_robot
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup('r4link')
-    group.addoption('--r4-transport', choices=TRANSPORTS, default='sim', help='where simulated R4 boards are (sim)')
+    group.addoption('--r4-transport', choices=TRANSPORTS, default='sim',
+                    help='the transport of simulated R4 boards (sim)')
     group.addoption('--r4-interface', default='vcan0', help='the CAN interface of --r4-transport can (vcan0)')
 
 
@@ -43,7 +44,7 @@ def _node(number: int) -> int:
     node = 1 + worker + number * workers
     if node > 31:
         raise UsageError(f'board {number + 1} of a test of {workers} pytest workers', 'a CAN bus has the nodes 1 to 31',
-                         'use fewer workers (-n), or fewer boards')
+                         'use fewer workers (-n) or fewer boards')
     return node
 
 

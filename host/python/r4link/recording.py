@@ -60,7 +60,7 @@ class Log(NamedTuple):
         for board in self.boards:
             if which in (board.name, board.url):
                 return board
-        raise KeyError(f'{which!r}; there are {[board.name or board.url for board in self.boards]}')
+        raise KeyError(f'{which!r}: not found; the boards are {[board.name or board.url for board in self.boards]}')
 
 
 def read(path: str | os.PathLike[str], datagrams: bool = False) -> Log:

@@ -72,7 +72,7 @@ class SimBoard:
         self._robot: _core.SimulatedRobot | SimProcess
         if url is None:
             if settings:
-                raise UsageError(f'settings={dict(settings)}', 'a board in this process has none',
+                raise UsageError(f'settings={dict(settings)}', 'a board in this process has no settings',
                                  "give a URL to listen on, such as 'udp://127.0.0.1:0'")
             self._robot = _core.SimulatedRobot()
             self._url = with_link(self._robot.url, link) if link else self._robot.url

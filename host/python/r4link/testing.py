@@ -59,7 +59,7 @@ class SimProcess:
     def __init__(self, url: str, *options: str) -> None:
         command = os.environ.get('R4') or shutil.which('r4')
         if not command:
-            raise UsageError('the command r4', 'it is not on PATH', 'set R4=FILE, such as build/r4')
+            raise UsageError('the command r4', 'the command is not on PATH', 'set R4=FILE, such as build/r4')
         self._process = subprocess.Popen(  # pylint: disable=consider-using-with
             [command, 'sim', url, '--json', '--stdin', '--sensors', '0.01', *options], stdin=subprocess.PIPE,
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
@@ -92,7 +92,7 @@ class SimProcess:
         try:
             self._process.stdin.write(words + '\n')
         except (OSError, ValueError) as error:  # ValueError: after close()
-            raise DataError('r4 sim', 'it has ended', f'exit code {self._process.poll()}') from error
+            raise DataError('r4 sim', 'the process has ended', f'exit code {self._process.poll()}') from error
 
     def look(self) -> Look:
         """The last values of the pins, and sensor values that are at most 10 ms old."""
@@ -100,7 +100,7 @@ class SimProcess:
         deadline = time.monotonic() + 5
         while not self._outputs or not self._sensors:  # waits for the first line of each kind
             if time.monotonic() > deadline:
-                raise OpenError('r4 sim', 'it tells nothing', 'is it stopped?')
+                raise OpenError('r4 sim', 'the process prints nothing', 'check whether the process is stopped')
             time.sleep(0.002)
         with self._lock:
             pins, senses = dict(self._outputs), dict(self._sensors)
@@ -136,8 +136,9 @@ class SimProcess:
 
     def _require_own(self) -> None:
         if os.getpid() != self._parent:
-            raise ClosedError('r4 sim', f'it was started by the process {self._parent}, of which this one is a fork',
-                              'start one here, after the fork')
+            raise ClosedError('r4 sim',
+                              f'the process {self._parent} started it, and this process is a fork of that process',
+                              'start r4 sim in this process, after the fork')
 
     def _read(self) -> None:
         assert self._process.stdout
@@ -161,7 +162,7 @@ def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0'
     if transport == 'sim':
         return SimBoard()
     if transport not in TRANSPORTS:
-        raise UsageError(f'transport {transport!r}', 'there is no such one', f'use one of {", ".join(TRANSPORTS)}')
+        raise UsageError(f'transport {transport!r}', 'the transport does not exist', f'use one of {", ".join(TRANSPORTS)}')
     where = {'udp': 'udp://127.0.0.1:0', 'pty': f'pty:{folder}/r4-{node}', 'can': f'can://{interface}?node={node}'}
     return SimProcess(where[transport], *(('--link', link) if link else ()))
 
@@ -180,7 +181,7 @@ class TestBoard(Board):
         """
         for name in fields:
             if name not in FIELDS:
-                raise UsageError(f'expect({name}=…)', 'the board has no such field', 'see r4link.FIELDS')
+                raise UsageError(f'expect({name}=…)', 'this is not a state field', 'see r4link.FIELDS')
         begin = time.monotonic()
         count = 0
         state = self.state
@@ -195,7 +196,7 @@ class TestBoard(Board):
                 count += 1
             except Error as error:
                 if self.link.state not in (LinkState.ACTIVE, LinkState.SAFE):
-                    raise AssertionError(f'no state came within {within} s: {error}') from None
+                    raise AssertionError(f'a state did not arrive within {within} s: {error}') from None
         wrong = [f'{name} is {getattr(state, name)!r}, not {_words(wanted)}' for name, wanted in fields.items()
                  if not _is(getattr(state, name), wanted)]
         raise AssertionError(f'after {within} s and {count} states: {"; ".join(wrong)} '

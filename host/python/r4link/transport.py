@@ -67,7 +67,8 @@ class Transport:
 
     def _open(self, receive: Callable[..., None]) -> None:
         if self._receive is not None:
-            raise UsageError(self.name, 'it carries another board already', 'give each board a transport of its own')
+            raise UsageError(self.name, 'the transport already carries another board',
+                             'give each board a separate transport')
         self._receive = receive
         try:
             self.open()

@@ -59,28 +59,30 @@ TEST(Bridge, RefusesUrlsThatCannotBeJoined) {
     const char* reason;
   };
   const char* const same = "both sides of the bridge are the same";
-  const char* const several = "a side of a bridge is one path, and these are several";
-  const char* const no_key = "which asks for no key at its cable";
-  const char* const no_transport = "it does not begin with a transport and a colon";
+  const char* const several = "this gives several paths, and each side of a bridge has one path";
+  const char* const no_key = "which does not need a key at its cable";
+  const char* const no_transport = "the URL does not begin with a transport and a colon";
   for (const Case& each : {
            Case{"udp://127.0.0.1:2018", "udp://127.0.0.1:2018", same},
            Case{"can://can0?node=1", "can://can0", same},
            Case{"pty:/tmp/r4", "serial:///tmp/r4", same},
            Case{"udp://0.0.0.0:2018", "udp://localhost",
-                "that is where the bridge itself listens for hosts"},
+                "the bridge itself listens for hosts at this address"},
            Case{"udp://0.0.0.0:2390", "udp://192.0.2.1",
-                "it hears the board at the port where the other side listens for hosts"},
+                "both sides would use the same port: one for the board, one for hosts"},
            Case{"udp://127.0.0.1:2100-2107", "can://can0?node=0-6",
-                "they stand for 8 and 7 transports"},
-           Case{"udp://127.0.0.1:0", "can://can0?node=1-2", "they stand for 1 and 2 transports"},
-           Case{"udp://127.0.0.{1-2}:0", "can://can0?node={1,1}", "it is named twice"},
-           Case{"udp://127.0.0.{1,1}:0", "can://can0?node=0-1", "it is named twice"},
+                "the two sides give 8 and 7 transports"},
+           Case{"udp://127.0.0.1:0", "can://can0?node=1-2",
+                "the two sides give 1 and 2 transports"},
+           Case{"udp://127.0.0.{1-2}:0", "can://can0?node={1,1}", "the board is named twice"},
+           Case{"udp://127.0.0.{1,1}:0", "can://can0?node=0-1", "the board is named twice"},
            Case{"robot", "serial:auto", no_transport},
            Case{"udp://127.0.0.1:0", "robot", no_transport},
-           Case{"sim:", "udp://192.0.2.1", "sim: is a board, it cannot listen"},
-           Case{"udp://127.0.0.1:0", "replay:/tmp/x", "a recording cannot be driven"},
+           Case{"sim:", "udp://192.0.2.1", "sim: is itself a board, so it cannot listen"},
+           Case{"udp://127.0.0.1:0", "replay:/tmp/x",
+                "a recording is not a board that can be driven"},
            Case{"udp://127.0.0.1:0",
-                "pty:", "pty: is for the side of hosts, which open its other end"},
+                "pty:", "pty: is only for the side of the hosts, which open the other end"},
            Case{"udp://127.0.0.1:0", "serial:auto+udp://192.0.2.1", several},
            Case{"udp://127.0.0.1:0+pty:", "serial:auto", several},
            Case{"udp://0.0.0.0:0", "serial:auto", no_key},
@@ -109,8 +111,9 @@ TEST(Bridge, OpensACableBoardToANetworkOnlyWithAKeyOrOnRequest) {
     if (event.event.kind == CarrierEvent::Kind::warning) warned = event.event.problem.text();
   };
   EXPECT_NO_THROW(Bridge("udp://0.0.0.0:0", away, open));
-  EXPECT_NE(warned.find("it is open: everyone who reaches it may drive the board"),
-            std::string::npos)
+  EXPECT_NE(
+      warned.find("the bridge is open: every program that reaches the bridge may drive the board"),
+      std::string::npos)
       << warned;
   open.keys = keyed.keys;
   EXPECT_EQ(problem_of([&] { Bridge("udp://0.0.0.0:0", away, open); }).kind, ErrorKind::usage);

@@ -106,7 +106,7 @@ TEST(CommandHelp, ShowsTheCommandThatAnInvalidTextBeginsWith) {
             "use X:DAC,channel,mV with channel 1-2, mV 0-3300");
   EXPECT_EQ(bad_command("E:GO", Refusal::unknown).fix, "use E:STOP, E:CLEAR[,cause], E:LEAVE");
   EXPECT_EQ(bad_command("E:STOP,1", Refusal::format).fix, "use E:STOP");
-  EXPECT_NE(bad_command("G:1", Refusal::unknown).fix.find("the commands are O:pwm,dir,ch D:"),
+  EXPECT_NE(bad_command("G:1", Refusal::unknown).fix.find("use one of O:pwm,dir,ch D:"),
             std::string::npos);
 }
 

@@ -50,7 +50,7 @@ TEST(ServoCalibration, RefusesAnAngleBeyondAnEnd) {
     EXPECT_EQ(problem_of([&] { elbow.pulse(Degrees(beyond)); }).kind, ErrorKind::usage) << beyond;
   }
   EXPECT_EQ(problem_of([] { elbow.pulse(Degrees(60)); }).text(),
-            "60 degrees: the angle is outside of the servo's calibration; give -45 to 45");
+            "60 degrees: the angle is outside the servo's calibration; give -45 to 45");
   EXPECT_TRUE(elbow.is_in_range(Degrees(45.01)))
       << "less than half a microsecond outside of the range";
 }

@@ -41,7 +41,7 @@ TEST(Setpoints, RefuseInvalidCommandsWhenTheyAreAdded) {
   const Problem twice = refusal_of(Command::osmc(1, Pwm(5), Direction::forward));
   EXPECT_EQ(twice.kind, ErrorKind::usage);
   EXPECT_EQ(twice.thing, "O:5,1,1");
-  EXPECT_TRUE(contains(twice.reason, "same channel"));
+  EXPECT_TRUE(contains(twice.reason, "its channel"));
   for (const Command& command :
        {Command::stop(), Command::proximity(1, Centimetres(5)), Command::fields("ALL"),
         Command::setting("rate", "50"), Command::identify()}) {

@@ -25,7 +25,7 @@ Report some_report() {
   report.wiring_source = "given";
   CheckResult motor{"osmc 1", Status::found, "a note\nof two lines"};
   motor.measured = {{"encoder 1, forward", 116, "counts"}, {"share", 0.25, "%"}};
-  motor.found = {{Finding::exchanged, "osmc 1", "osmc 2 in its place"},
+  motor.found = {{Finding::exchanged, "osmc 1", "osmc 2 instead"},
                  {Finding::reversed, "osmc 1", ""}};
   motor.learnt = {
       {Learnt::What::serves, signal_named("osmc 1 pwm"), signal_named("osmc 2 pwm"), {}, 1},
@@ -66,7 +66,7 @@ TEST(CommissioningReport, ShowsForeignTextHarmlessly) {
     EXPECT_EQ(text.find('\x1b'), std::string::npos);
     EXPECT_EQ(text.find('\xff'), std::string::npos);
   }
-  EXPECT_NE(html.find("osmc 2 in its place"), std::string::npos);
+  EXPECT_NE(html.find("osmc 2 instead"), std::string::npos);
   EXPECT_NE(html.find("not reached"), std::string::npos);
 }
 

@@ -68,7 +68,7 @@ TEST(LoopGuard, EndsForGoodWhenACompleteStateIsLate) {
   EXPECT_EQ(delayed.ended(), LoopEnd::late);
   LoopGuard nothing = begun({.fields = "ENC1", .first = 300ms});
   EXPECT_EQ(nothing.check(HostLinkState::active, DisarmCause::none, at(1300)), LoopEnd::late);
-  EXPECT_TRUE(contains(nothing.why(), "no state came within 300 ms")) << nothing.why();
+  EXPECT_TRUE(contains(nothing.why(), "a state did not arrive within 300 ms")) << nothing.why();
 }
 
 TEST(LoopGuard, EndsWhenTheBoardIsSafeDisarmedLostOrRestarted) {

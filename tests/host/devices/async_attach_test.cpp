@@ -65,8 +65,8 @@ TEST_F(AsyncAttach, RefusesASlotOfAnotherDeviceUntilThatIsDetached) {
   const Problem problem = problem_with("ina219@0x41");
   EXPECT_EQ(problem.kind, ErrorKind::usage);
   EXPECT_EQ(problem.text(),
-            "ina219@0x41:1: ina219@0x40 has slot 1; name a free one, ina219@0x41:3, or give the "
-            "other up first: X:OFF,1 X:OFF,2");
+            "ina219@0x41:1: ina219@0x40 has slot 1; use a free slot, ina219@0x41:3, or release "
+            "that device first: X:OFF,1 X:OFF,2");
   EXPECT_EQ(problem_with("mpu6050@0x68:2").reason, "ina219@0x40 has slot 2");
   EXPECT_EQ(commands(), before) << "a refused attach must not send";
 
@@ -105,7 +105,7 @@ TEST_F(AsyncAttach, RefusesAnotherDeviceAndWritesNothingToIt) {
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_EQ(problem.outcome, Outcome::refused);
   EXPECT_EQ(problem.thing, "icm20948@0x68");
-  EXPECT_EQ(problem.reason, "it is another device: its register x00 has x00, not xea");
+  EXPECT_EQ(problem.reason, "this is another device: its register x00 has x00, not xea");
   EXPECT_FALSE(problem.fix.empty());
 }
 
@@ -114,7 +114,8 @@ TEST_F(AsyncAttach, RefusesADeviceThatDoesNotAnswer) {
   const CommandResult result = attach(missing);
   EXPECT_EQ(result.outcome, Outcome::refused);
   EXPECT_EQ(result.transfer.outcome, I2cOutcome::no_acknowledge);
-  EXPECT_EQ(explain(missing, result, board_.link()).reason, "it does not answer: no acknowledge");
+  EXPECT_EQ(explain(missing, result, board_.link()).reason,
+            "the device does not answer: no acknowledge");
 }
 
 TEST_F(AsyncAttach, CanBeCancelledWhileItWaitsForTheDevice) {
@@ -161,7 +162,7 @@ TEST_F(AsyncAttach, NamesTheDeviceWhenTheBoardIsSilent) {
   EXPECT_EQ(result.outcome, Outcome::timed_out);
   const Problem problem = explain(device, result, board.link());
   EXPECT_EQ(problem.thing, "ina219@0x40: X:READ,64,x01,2");
-  EXPECT_TRUE(contains(problem.reason, "nothing was heard from the board yet"));
+  EXPECT_TRUE(contains(problem.reason, "nothing was received from the board yet"));
 }
 
 struct AsyncAttachUnarmed : AsyncAttach {

@@ -144,16 +144,16 @@ std::string what_is_there(const Device& device, std::vector<std::uint8_t> identi
 TEST(Device, NamesASubstituteChipAndAdvises) {
   const std::string clone = what_is_there(Device::from("mpu6050@0x68"), {0x70});
   EXPECT_EQ(clone.substr(0, clone.find(';')),
-            "it is an MPU-6500, which has another scale of its temperature: its register x75 has "
+            "this is an MPU-6500, which has another scale of its temperature: its register x75 has "
             "x70, not x68");
-  EXPECT_NE(clone.find("let the copy check x75 x70"), std::string::npos) << clone;
+  EXPECT_NE(clone.find("write check x75 x70"), std::string::npos) << clone;
   for (const int identity : {0x71, 0x72, 0x98}) {
     const std::string other =
         what_is_there(Device::from("mpu6050@0x68"), {static_cast<std::uint8_t>(identity)});
-    EXPECT_NE(other.find("let the copy check"), std::string::npos) << other;
+    EXPECT_NE(other.find("write check"), std::string::npos) << other;
   }
-  EXPECT_EQ(what_is_there(Device::from("mpu6050@0x68"), {0x00}).substr(0, 20),
-            "it is another device");
+  EXPECT_EQ(what_is_there(Device::from("mpu6050@0x68"), {0x00}).substr(0, 22),
+            "this is another device");
 }
 
 TEST(Device, ComparesAScaledConditionAsWritten) {
@@ -227,22 +227,22 @@ const std::string description_head = "device a\naddress 0x28\npoll p x08 6 20\n"
 
 TEST(DeviceDescription, ReportsTheErrorInALine) {
   for (const WrongText& each : {
-           WrongText{4, "device b\n", "it has a name already"},
+           WrongText{4, "device b\n", "the device has a name already"},
            WrongText{4, "check x000000 x00\n", "a register has 3 bytes"},
-           WrongText{4, "check x00 x\n", "what is expected has 0 bytes"},
-           WrongText{4, "check x00 x0\n", "what is expected is not written as bytes"},
-           WrongText{4, "write 3d00\n", "what is written is not written as bytes"},
-           WrongText{4, "write x" + std::string(66, '0') + "\n", "what is written has 33 bytes"},
+           WrongText{4, "check x00 x\n", "the expected value has 0 bytes"},
+           WrongText{4, "check x00 x0\n", "the expected value is not in the form of bytes"},
+           WrongText{4, "write 3d00\n", "the written value is not in the form of bytes"},
+           WrongText{4, "write x" + std::string(66, '0') + "\n", "the written value has 33 bytes"},
            WrongText{4, "write x3d00 wait 5001\n", "the wait in ms is out of range"},
-           WrongText{4, "write x3d00 then 5\n", "it has not its form"},
+           WrongText{4, "write x3d00 then 5\n", "the line does not have the form of its word"},
            WrongText{4, "poll q x00 33 20\n", "the count of bytes is out of range"},
            WrongText{4, "poll q x00 3 4\n", "the period in ms is out of range"},
-           WrongText{4, "poll p x00 3 5\n", "there is a poll of that name"},
-           WrongText{4, "value v q 0 u8\n", "no poll above has that name"},
-           WrongText{4, "value v p 5 u16be\n", "it ends behind the 6 bytes of its poll"},
-           WrongText{4, "value v p 0 u16\n", "there is no such type"},
-           WrongText{4, "value v p 0 u8be\n", "there is no such type"},
-           WrongText{4, "value v p 0 u40be\n", "there is no such type"},
+           WrongText{4, "poll p x00 3 5\n", "a poll has this name already"},
+           WrongText{4, "value v q 0 u8\n", "a poll of this name is not defined above"},
+           WrongText{4, "value v p 5 u16be\n", "the value ends after the 6 bytes of its poll"},
+           WrongText{4, "value v p 0 u16\n", "this is not a valid type"},
+           WrongText{4, "value v p 0 u8be\n", "this is not a valid type"},
+           WrongText{4, "value v p 0 u40be\n", "this is not a valid type"},
            WrongText{4, "value v p 0 u8 bits 0..8\n", "the highest bit is out of range"},
            WrongText{4, "value v p 0 u8 bits 5..3\n", "the highest bit is out of range"},
            WrongText{4, "value v p 0 u8 bits 5\n", "the highest bit is not a number"},
@@ -253,18 +253,18 @@ TEST(DeviceDescription, ReportsTheErrorInALine) {
            WrongText{4, "value v p 0 u8 scale 1e-31\n", "the scale is out of range"},
            WrongText{4, "value v p 0 u8 range 0 1e300\n", "the range is out of range"},
            WrongText{4, "value v p 0 u8 only w 1\nvalue w p 0 u8\n",
-                     "no value above has that name"},
-           WrongText{4, "value v p 0 u8 scale\n", "something is missing at its end"},
-           WrongText{4, "value v p 0 u8 unit a,b\n", "that is not a valid unit"},
+                     "a value of this name is not defined above"},
+           WrongText{4, "value v p 0 u8 scale\n", "a word is missing at the end of the line"},
+           WrongText{4, "value v p 0 u8 unit a,b\n", "this is not a valid unit"},
            WrongText{4, "value v p 0 u8 range 1 1\n", "the range is empty"},
            WrongText{4, "value v p 0 u8 unit V unit V\n", "a word is named twice"},
            WrongText{4, "value v p 0 u8 gain 3\n", "a word of the value is not known"},
-           WrongText{4, "ready v 1\n", "no value above has that name"},
+           WrongText{4, "ready v 1\n", "a value of this name is not defined above"},
            WrongText{4, "lookalike x00 x01\n", "it has 3 words"},
            WrongText{4,
                      "lookalike x00 x01 a\x1b"
                      "b\n",
-                     "its title is too long, or not plain text"},
+                     "the title is too long, or not plain text"},
        }) {
     expect_problem(each, description_head);
   }
@@ -276,36 +276,36 @@ TEST(DeviceDescription, ReportsAnErrorWithItsLineNumber) {
   std::string many = description_head;
   for (int i = 0; i < 257; ++i) many += "value v" + std::to_string(i) + " p 0 u8\n";
   for (const WrongText& each : {
-           WrongText{0, "", "it is empty"},
-           WrongText{1, "title x\n", "it does not begin with its name"},
-           WrongText{1, "device A\n", "that is not a valid name"},
+           WrongText{0, "", "the description is empty"},
+           WrongText{1, "title x\n", "the description does not begin with its name"},
+           WrongText{1, "device A\n", "this is not a valid name"},
            WrongText{6, description_head + "\n\nregister x00\n",
-                     "\"register\" is not one of its words"},
+                     "\"register\" is not a valid word"},
            WrongText{2, "device a\naddress 7\n", "an address is out of range"},
            WrongText{2, "device a\naddress 0x78\n", "an address is out of range"},
            WrongText{2, "device a\naddress 9 9\n", "an address is named twice"},
            WrongText{2, "device a\naddress x28\n", "an address is not a number"},
-           WrongText{2, "device a\nrole car\n", "there is no such role"},
-           WrongText{3, "device a\nrole imu\nrole imu\n", "it has a role already"},
-           WrongText{3, "device a\ntitle b\ntitle c\n", "it has a title already"},
-           WrongText{11, nine, "the board repeats 8 readings at most"},
+           WrongText{2, "device a\nrole car\n", "this is not a valid role"},
+           WrongText{3, "device a\nrole imu\nrole imu\n", "the device has a role already"},
+           WrongText{3, "device a\ntitle b\ntitle c\n", "the device has a title already"},
+           WrongText{11, nine, "the board repeats at most 8 readings"},
            WrongText{5, description_head + "value w p 0 u8\nvalue v p 0 u8 only w\n",
-                     "something is missing at its end"},
+                     "a word is missing at the end of the line"},
            WrongText{5, description_head + "value v p 0 u8\nready v 1 2\n", "it has 4 words"},
            WrongText{5, description_head + "value v p 0 u8\nready v x01\n",
-                     "what that value is while it is set up is not a number"},
+                     "the number after ready is not a number"},
            WrongText{5, description_head + "value v p 0 u8\nvalue v p 1 u8\n",
-                     "there is a value of that name"},
-           WrongText{260, many, "it has more than 256 values"},
-           WrongText{0, description_head, "it has no value"},
-           WrongText{0, "device a\npoll p x 1 5\nvalue v p 0 u8\n", "it has no address"},
-           WrongText{0, "device a\naddress 8\n", "nothing is read"},
+                     "a value has this name already"},
+           WrongText{260, many, "the description has more than 256 values"},
+           WrongText{0, description_head, "the device has no value"},
+           WrongText{0, "device a\npoll p x 1 5\nvalue v p 0 u8\n", "the device has no address"},
+           WrongText{0, "device a\naddress 8\n", "the device has no poll"},
            WrongText{0, description_head + "role angle\nvalue angle p 0 u8 unit deg\n",
-                     "with the role angle it needs a value angle in rad"},
+                     "the role angle needs a value angle in rad"},
            WrongText{0, description_head + "role range\nvalue distance p 0 u8 unit m\n",
-                     "its distance has no range"},
+                     "the value distance has no range"},
            WrongText{1, std::string(500, 'a'), "the line has more than 400 characters"},
-           WrongText{0, std::string(70000, '\n'), "it has more than 65536 bytes"},
+           WrongText{0, std::string(70000, '\n'), "the file has more than 65536 bytes"},
        }) {
     expect_problem(each);
   }
@@ -352,13 +352,13 @@ TEST(Device, IsNamedWithItsAddressAndSlot) {
             "bno055@0x28: it takes 2 slots from slot 8 on, and the board has 8");
   EXPECT_EQ(usage_of({"bno055@0x28:0"}),
             "bno055@0x28: it takes 2 slots from slot 0 on, and the board has 8");
-  EXPECT_EQ(usage_of({"bno055@0x30"}), "bno055@0x30: it cannot have that address");
-  EXPECT_EQ(usage_of({"bno055@"}), "bno055@: its address or slot is not a number");
-  EXPECT_EQ(usage_of({"bno055@0x28:"}), "bno055@0x28:: its address or slot is not a number");
+  EXPECT_EQ(usage_of({"bno055@0x30"}), "bno055@0x30: the device cannot have this address");
+  EXPECT_EQ(usage_of({"bno055@"}), "bno055@: the address or slot is not a number");
+  EXPECT_EQ(usage_of({"bno055@0x28:"}), "bno055@0x28:: the address or slot is not a number");
   EXPECT_EQ(usage_of({"mpu6050@0x68:2", "bno055@0x28:1"}),
             "bno055@0x28: mpu6050@0x68 has slot 2, too");
   EXPECT_EQ(usage_of({"mpu6050@0x68", "icm20948@0x68"}),
-            "icm20948@0x68: mpu6050@0x68 has that address, too");
+            "icm20948@0x68: mpu6050@0x68 has the same address");
   EXPECT_THROW(Device::from("ina219", std::numeric_limits<int>::max()), Error);
 }
 

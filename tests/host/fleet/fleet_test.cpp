@@ -190,12 +190,12 @@ TEST(Fleet, RefusesInvalidUrlsBoardsAndCommands) {
   };
   EXPECT_EQ(problem({}).kind, ErrorKind::usage);
   EXPECT_EQ(problem({"sim:?node=0-3", "sim:?node=2"}).text(),
-            "sim:?node=2: it is named twice; name it once");
+            "sim:?node=2: the board is named twice; name each board once");
   EXPECT_EQ(problem({"udp://10.0.0.{1-"}).kind, ErrorKind::usage);
   EXPECT_EQ(problem({"sim:", "serial:///dev/no-such-port"}).kind, ErrorKind::open);
   Fleet fleet({"sim:?node=0-1"});
   EXPECT_EQ(problem_of([&] { fleet.send({2}, "O:1,1,1"); }).text(),
-            "board 2: the fleet has no such board; they are 0 to 1");
+            "board 2: the fleet has no such board; give 0 to 1");
   EXPECT_EQ(problem_of([&] { fleet.find("nobody"); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { fleet.send("O:1,1,9"); }).kind, ErrorKind::usage);
 }

@@ -141,7 +141,7 @@ TEST(RecordingReader, RefusesAFileThatIsNotARecording) {
     const Problem problem = problem_of([&] { heard_in(file); });
     EXPECT_EQ(problem.kind, ErrorKind::data);
     EXPECT_EQ(problem.thing, "test");
-    EXPECT_EQ(problem.reason, "no recording");
+    EXPECT_EQ(problem.reason, "is not a recording");
   }
 }
 

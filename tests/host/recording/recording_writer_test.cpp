@@ -124,15 +124,15 @@ TEST_F(RecordingWriterTest, GoesOnAfterATornLine) {
 
 TEST_F(RecordingWriterTest, DoesNotOverwriteOtherFiles) {
   for (const char* const name : {"notes.txt", "a.r4log.zst"}) {
-    std::ofstream(path(name)) << "something else";
+    std::ofstream(path(name)) << "other data";
     const Problem problem = problem_of([&] { RecordingWriter(path(name), {}); });
     EXPECT_EQ(problem.kind, ErrorKind::data);
     EXPECT_EQ(problem.thing, path(name));
-    EXPECT_EQ(content(name), "something else");
+    EXPECT_EQ(content(name), "other data");
   }
   const RecordingWriter first(path("a.r4log"), {});
   EXPECT_TRUE(contains(problem_of([&] { RecordingWriter(path("a.r4log"), {}); }).reason,
-                       "another program records into it"));
+                       "another program records into this file"));
   EXPECT_EQ(problem_of([&] { RecordingWriter(folder.string(), {}); }).reason, "is a directory");
   ASSERT_EQ(::mkfifo(path("fifo").c_str(), 0600), 0);
   EXPECT_EQ(problem_of([&] { RecordingWriter(path("fifo"), {}); }).reason, "is not a file");
@@ -211,7 +211,7 @@ TEST_F(RecordingWriterTest, RecordsOnAFileSystemThatHasNoLocks) {
   in_a_thread_of_its_own([&] {
     refuse({SYS_flock, EWOULDBLOCK, std::nullopt});
     EXPECT_EQ(problem_of([&] { RecordingWriter(path("taken"), {}); }).reason,
-              "another program records into it");
+              "another program records into this file");
   });
 }
 

@@ -92,7 +92,8 @@ TEST_F(Replay, MayBeginAtAClockTimeOfTheRecording) {
   EXPECT_EQ(heard.datagrams[0].text, "5");
   const Problem late = problem_of([&] { play("?from=2026-11-23T21:11:42.5Z"); });
   EXPECT_EQ(late.kind, ErrorKind::data);
-  EXPECT_TRUE(late.reason.starts_with("the last of that path is of 2026-11-23T21:11:42.000000Z"));
+  EXPECT_TRUE(
+      late.reason.starts_with("the last record of that path is of 2026-11-23T21:11:42.000000Z"));
   EXPECT_EQ(problem_of([&] { play("?from=11"); }).reason, late.reason);
   for (const char* wrong :
        {"", "x", "-1", "1795468293", "2026-11-23", "2026-11-23T21:11:37+01:00"}) {
@@ -122,13 +123,14 @@ TEST_F(Replay, ReportsDamageFarAheadOfThePlayedRecord) {
   add(1ms, "two");
   play("");
   ASSERT_EQ(heard.count(Kind::warning), 1U);
-  EXPECT_EQ(heard.last(Kind::warning)->problem.reason, "line 2004: it begins with no time");
+  EXPECT_EQ(heard.last(Kind::warning)->problem.reason,
+            "line 2004: the line does not begin with a time");
   EXPECT_EQ(heard.datagrams.size(), 2U);
 }
 
 TEST_F(Replay, RefusesAFileThatItCannotPlay) {
   add(0ms, "one");
-  EXPECT_EQ(problem_of([&] { play("?path=3"); }).reason, "nothing of that path is there");
+  EXPECT_EQ(problem_of([&] { play("?path=3"); }).reason, "that path has no records");
   EXPECT_EQ(problem_of([&] { play("?speed=0"); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { play("?pace=2"); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { Board("replay:"); }).kind, ErrorKind::usage);
@@ -141,7 +143,7 @@ TEST_F(Replay, RefusesAFileThatItCannotPlay) {
   EXPECT_EQ(problem_of([&] { Board("replay:" + fifo); }).reason, "is not a regular file");
   fs::remove(fifo);
   text = "something else";
-  EXPECT_EQ(problem_of([&] { play(""); }).reason, "no recording");
+  EXPECT_EQ(problem_of([&] { play(""); }).reason, "is not a recording");
 }
 
 }  // namespace

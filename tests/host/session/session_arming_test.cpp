@@ -254,7 +254,7 @@ TEST_F(EarlierCause, IsNotClearedByArming) {
   EXPECT_EQ(result.outcome, Outcome::not_armed);
   EXPECT_EQ(result.disarmed, DisarmCause::earlier_stop);
   const Problem problem = explain("arm()", result, link.session.link());
-  EXPECT_EQ(problem.reason, "not armed: stopped before this program began");
+  EXPECT_EQ(problem.reason, "not armed: an emergency stop came before this program began");
   EXPECT_EQ(
       problem.fix,
       "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), then call arm()");

@@ -133,7 +133,7 @@ TEST_F(SessionGroup, EndsAtTheFirstFailureOnABoardWithoutGroups) {
   EXPECT_EQ(link.count('S'), 0U);
   const Problem problem = explain(two_motors, result(ticket), link.session.link());
   EXPECT_EQ(problem.thing, "O:359,1,2");
-  EXPECT_TRUE(contains(problem.reason, "command 2 of 3, and those before it were executed"));
+  EXPECT_TRUE(contains(problem.reason, "command 2 of 3, and the commands before it were executed"));
 
   const Ticket late = send(100ms);
   link.pass(100ms);

@@ -284,9 +284,9 @@ TEST(Explain, ReportsThatTheBoardHasNoRoomForAnotherKey) {
 TEST(Explain, DistinguishesACableOnlySettingFromAMissingKey) {
   const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
   EXPECT_EQ(explain(Command::setting("key", "1:..."), refused, {}).fix,
-            "send it over USB: serial:auto");
+            "send the command over USB: serial:auto");
   EXPECT_EQ(explain(Command::setting("node", "5"), refused, {}).fix,
-            "send it over USB: serial:auto");
+            "send the command over USB: serial:auto");
   for (const Command& command :
        {Command::setting("rate", "50"), Command::osmc(1, Pwm(1), Direction::forward)}) {
     EXPECT_NE(explain(command, refused, {}).fix.find("--key FILE"), std::string::npos);

@@ -108,12 +108,12 @@ TEST_F(NewSession, ReportsWhenTheBoardTakesCommands) {
   link.pass(10ms);
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
   EXPECT_FALSE(link.session.link().in_control);
-  EXPECT_TRUE(contains(explain("board", link.session.link()).reason, "confirmed no command"));
+  EXPECT_TRUE(contains(explain("board", link.session.link()).reason, "not confirmed a command"));
   link.executed(link.last('F').pnum);
   EXPECT_TRUE(link.session.link().in_control);
   EXPECT_TRUE(link.links.back().in_control) << "on_link must report it";
   EXPECT_EQ(explain("board", link.session.link()).reason,
-            "the board is active and takes our commands");
+            "the board is active and accepts our commands");
 }
 
 TEST_F(SessionLink, ReportsThatTheTransportIsDown) {
@@ -133,7 +133,7 @@ TEST_F(SessionLink, ReportsLateFramesOnlyWhileTheBoardIsHeard) {
   link.pass(1100ms);
   EXPECT_EQ(link.session.link().state, HostLinkState::lost);
   EXPECT_TRUE(link.session.link().causes.empty());
-  EXPECT_EQ(explain("board", link.session.link()).reason, "the board has fallen silent");
+  EXPECT_EQ(explain("board", link.session.link()).reason, "the board is silent");
 }
 
 TEST_F(NewSession, ReportsForeignFramesBeforeTheBoardIsHeard) {
@@ -158,7 +158,7 @@ TEST(Explain, AdvisesToCutThePowerForAnUnconfirmedStop) {
   link.causes = {LinkCause::watchdog, LinkCause::busy, LinkCause::key_needed};
   const CommandResult unheard{Outcome::timed_out, Refusal::none, 1s};
   const Problem silent = explain(Command::stop(), unheard, link);
-  EXPECT_TRUE(contains(silent.reason, "not confirmed within 1000 ms: nothing was heard"));
+  EXPECT_TRUE(contains(silent.reason, "not confirmed within 1000 ms: nothing was received"));
   EXPECT_TRUE(silent.fix.starts_with("CUT THE POWER")) << silent.fix;
   EXPECT_EQ(silent.text().find("watchdog"), std::string::npos) << silent.text();
   link.state = HostLinkState::active;

@@ -97,11 +97,12 @@ TEST(WiringFile, NamesLineSignalReasonAndFix) {
                "handle: D20 belongs to an I2C bus; choose another pin");
   expect_error(edited("handle = D42", "handle = D7"), at("handle = "), "half the supply");
   expect_error(edited("stepper 3 step = D4\n", "stepper 3 step = D42\n"), at("stepper 3 step"),
-               "D42 is the place of handle, too");
+               "D42 is already the place of handle");
   expect_error(edited("encoder 1 a = D25", "encoder 1 a = D55"), at("encoder 1 a"),
-               "D55 has interrupt line 8, which is that of the WiFi chip");
+               "D55 has interrupt line 8, which is also the line of the WiFi chip");
   expect_error(edited("ultrasonic 2 echo = D50", "ultrasonic 2 echo = D72"),
-               at("ultrasonic 2 echo"), "D72 has interrupt line 3, which is that of encoder 2 b");
+               at("ultrasonic 2 echo"),
+               "D72 has interrupt line 3, which is also the line of encoder 2 b");
   expect_error(edited("stepper 2 direction = D36", "stepper 2 direction = none"),
                at("stepper 2 step"), "is connected, but stepper 2 direction is not");
   expect_error(edited("osmc 1 pwm = osmc.0", "osmc 1 pwm = dhb12.15"), at("osmc 1 pwm"),

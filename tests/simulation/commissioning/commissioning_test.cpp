@@ -258,9 +258,10 @@ TEST(Commissioning, GivesWhatItLearntAndFindsNothingAfterwards) {
             (std::vector<std::string>{"supply AIN24: divider wrong", "relay 2: exchanged",
                                       "relay 5: exchanged", "osmc 2: reversed"}));
   EXPECT_EQ(commissioning.offer(), Commissioning::End::done);
-  EXPECT_EQ(commissioning.report().checks.back().note,
-            "the board keeps the wiring, and uses it: osmc 2 direction: osmc.3 -> osmc.3 inverted; "
-            "relay 2: GPB1 -> GPB4; relay 5: GPB4 -> GPB1");
+  EXPECT_EQ(
+      commissioning.report().checks.back().note,
+      "the board has stored the wiring, and uses it: osmc 2 direction: osmc.3 -> osmc.3 inverted; "
+      "relay 2: GPB1 -> GPB4; relay 5: GPB4 -> GPB1");
   Commissioning again(bench, person);
   again.run_all();
   EXPECT_EQ(findings_of(again.report()), (std::vector<std::string>{"supply AIN24: divider wrong"}))
@@ -473,7 +474,8 @@ TEST(Commissioning, SaysWhatTheBoardDoesNotSupport) {
   commissioning.run_all({"identity", "settings", "osmc 1"});
   const auto& checks = commissioning.report().checks;
   EXPECT_EQ(checks.at(0).status, commissioning::Status::unsupported);
-  EXPECT_EQ(checks.at(0).note, "the board does not say who it is: the paper's firmware");
+  EXPECT_EQ(checks.at(0).note,
+            "the board does not report its identity: it runs the paper's firmware");
   EXPECT_EQ(checks.at(1).status, commissioning::Status::unsupported);
   EXPECT_EQ(checks.at(2).status, commissioning::Status::passed);
   commissioning.offer();

@@ -149,13 +149,13 @@ TEST(BusLog, ReportsFailedTransfers) {
   dump.at_us += 101000;
   dump.frame(0x777, "");
   ASSERT_EQ(dump.printed.size(), 3U);
-  EXPECT_EQ(dump.printed[2]["reason"], "no consecutive frame in time (N_Cr)");
+  EXPECT_EQ(dump.printed[2]["reason"], "the next consecutive frame did not come in time (N_Cr)");
 
   dump.frame(0x183, "100A48656C6C6F2C");
   dump.at_us += 121000;
   dump.frame(0x777, "");
   ASSERT_EQ(dump.printed.size(), 4U);
-  EXPECT_EQ(dump.printed[3]["reason"], "no flow control in time (N_Bs)");
+  EXPECT_EQ(dump.printed[3]["reason"], "flow control did not come in time (N_Bs)");
 
   dump.frame(0x403, "1FFF48656C6C6F2C");
   EXPECT_EQ(dump.printed[4]["reason"], "longer than the receiver's buffer");

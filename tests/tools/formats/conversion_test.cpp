@@ -51,7 +51,7 @@ TEST(Conversion, ReportsTheLineOfDamageAndConvertsTheRest) {
   EXPECT_EQ(result.damage[0].offset, second);
   EXPECT_EQ(result.damage[0].line,
             1 + std::count(native.begin(), native.begin() + static_cast<long>(second), '\n'));
-  EXPECT_EQ(result.damage[1].reason, "the last line is not whole");
+  EXPECT_EQ(result.damage[1].reason, "the last line is not complete");
 }
 
 TEST(Conversion, WritesAReadableFileFromRecordingsWithADamagedHeader) {

@@ -98,12 +98,14 @@ TEST_F(RecordingSummaryTest, ShowsTheEndAndTheDroppedRecords) {
 
 TEST_F(RecordingSummaryTest, ListsTwentyDamagedLinesAndCountsTheRest) {
   for (std::uint64_t i = 1; i <= 1000; ++i) {
-    summary.on_damage({RecordingDamage::Kind::line, i, 10 * i, "it begins with no time"});
+    summary.on_damage(
+        {RecordingDamage::Kind::line, i, 10 * i, "the line does not begin with a time"});
   }
   EXPECT_TRUE(summary.damaged());
   EXPECT_EQ(summary.json("x")["damage"].size(), 20);
   EXPECT_EQ(summary.json("x")["damage_count"], 1000);
-  EXPECT_TRUE(test::contains(summary.text("x"), "line 20, byte 200: it begins with no time"));
+  EXPECT_TRUE(
+      test::contains(summary.text("x"), "line 20, byte 200: the line does not begin with a time"));
   EXPECT_TRUE(test::contains(summary.text("x"), "and 980 more"));
 }
 

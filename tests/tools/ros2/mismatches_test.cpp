@@ -39,8 +39,8 @@ TEST(GraphMismatch, NamesAPublisherOfAnotherType) {
   const auto wrong =
       mismatch_of(own, other_of(EndpointKind::writer, "std_msgs::msg::dds_::Float64_"));
   EXPECT_EQ(words_of(wrong),
-            "cmd_vel: a publisher (process 7 on robot) has the type std_msgs/msg/Float64, and is "
-            "not heard; publish geometry_msgs/msg/Twist");
+            "cmd_vel: a publisher (process 7 on robot) has the wrong type std_msgs/msg/Float64, "
+            "so its messages are ignored; publish geometry_msgs/msg/Twist");
   EXPECT_EQ(wrong->weight, Mismatch::Weight::lost);
   EXPECT_FALSE(mismatch_of(own, other_of(EndpointKind::reader, "anything")))
       << "a subscriber to a command topic must not be reported";
@@ -50,8 +50,8 @@ TEST(GraphMismatch, NamesASubscriberOfAnotherType) {
   const auto own = own_of(EndpointKind::writer, "encoder1", "std_msgs::msg::dds_::Int32_");
   const auto wrong = mismatch_of(own, other_of(EndpointKind::reader, "a\x1b[31m"));
   EXPECT_EQ(words_of(wrong),
-            "encoder1: a subscriber (process 7 on robot) has the type a\\x1b[31m, and receives "
-            "nothing; subscribe to std_msgs/msg/Int32");
+            "encoder1: a subscriber (process 7 on robot) has the wrong type a\\x1b[31m, so it "
+            "receives nothing; subscribe to std_msgs/msg/Int32");
   EXPECT_EQ(wrong->weight, Mismatch::Weight::warning);
 }
 
@@ -83,8 +83,8 @@ TEST(GraphMismatch, NamesThePolicyThatAWriterDoesNotFulfil) {
   auto reader = other_of(EndpointKind::reader, twist);
   reader.policies = latched;
   EXPECT_EQ(words_of(mismatch_of(own_of(EndpointKind::writer, "R4", twist), reader)),
-            "R4: a subscriber asks for more than this publisher offers, in durability, and "
-            "receives nothing (process 7 on robot); subscribe as ROS does by default");
+            "R4: a subscriber requires more durability than this publisher offers, so it receives "
+            "nothing (process 7 on robot); use the default settings of ROS");
 }
 
 TEST(GraphMismatch, IsNotReportedIfOneOfSeveralReadersMatches) {
@@ -112,8 +112,9 @@ TEST(GraphMismatch, IsReportedIfNoReaderCanBeMadeForAnotherType) {
     throw Error(ErrorKind::open, "rt/stop", "cannot be made", "look");
   };
   const auto other = other_of(EndpointKind::writer, "another");
-  EXPECT_EQ(words_of(mismatch_of(own, other)),
-            "stop: a publisher (process 7 on robot) is not heard: rt/stop: cannot be made; look");
+  EXPECT_EQ(
+      words_of(mismatch_of(own, other)),
+      "stop: a publisher (process 7 on robot) is not received: rt/stop: cannot be made; look");
 }
 
 Domain own_test_domain() {

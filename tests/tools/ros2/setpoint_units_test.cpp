@@ -97,7 +97,7 @@ TEST(Ros2CommandText, AnErrorDoesNotRepeatInvalidCharacters) {
       ADD_FAILURE() << wrong;
     } catch (const Error& error) {
       EXPECT_EQ(error.problem().text(),
-                "a command: has characters that no command has; write it in ASCII");
+                "a command: has characters that are not ASCII; write the command in ASCII");
     }
   }
 }

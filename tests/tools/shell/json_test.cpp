@@ -106,7 +106,7 @@ TEST(Json, CountsTheDatagramsOfATransport) {
 }
 
 TEST(Json, ShowsTheOutcomeOfACommandInAProblem) {
-  Problem problem{ErrorKind::refused, "O:1,1,9", "no such channel", "channels are 1-4"};
+  Problem problem{ErrorKind::refused, "O:1,1,9", "the channel does not exist", "channels are 1-4"};
   EXPECT_FALSE(problem_json(problem).contains("outcome"));
   problem.outcome = Outcome::timed_out;
   EXPECT_EQ(problem_json(problem)["outcome"], "timed out");

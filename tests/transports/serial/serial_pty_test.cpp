@@ -230,7 +230,7 @@ TEST_F(SerialPtyTest, ReportsOnceWhyAReturnedDeviceCannotBeOpened) {
   ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::down) == 1; }));
   std::ofstream(link) << "this is not a terminal";
   ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::warning) == 1; }));
-  EXPECT_EQ(at_host.last(Kind::warning)->problem.reason, "it is not a serial port");
+  EXPECT_EQ(at_host.last(Kind::warning)->problem.reason, "this file is not a serial port");
   run_for(io, milliseconds(250));
   EXPECT_EQ(at_host.count(Kind::warning), 1U);
   fs::remove(link);
@@ -379,7 +379,7 @@ TEST_F(SerialPtyTest, SaysThatADeviceIsInUse) {
   connect();
   const Problem problem = host_problem(url_for_host(*board));
   EXPECT_EQ(problem.kind, ErrorKind::open);
-  EXPECT_EQ(problem.reason, "it is in use by another program");
+  EXPECT_EQ(problem.reason, "the port is in use by another program");
   EXPECT_FALSE(problem.fix.empty());
   host->close();
   host->open(at_host);
@@ -434,8 +434,8 @@ TEST_F(SerialPtyTest, ASendReportsThatTheDeviceWasTaken) {
 
 TEST_F(SerialPtyTest, NamesAMissingDeviceAndOneThatIsNotASerialPort) {
   std::ofstream(folder / "file") << "text";
-  const std::string missing = "there is no such device";
-  const std::string other = "it is not a serial port";
+  const std::string missing = "the device does not exist";
+  const std::string other = "this file is not a serial port";
   for (const auto& [path, reason] : std::map<std::string, std::string>{
            {"/dev/ttyACM99", missing},
            {"/dev/pts/99999", missing},
@@ -530,8 +530,7 @@ TEST_F(SerialPtyTest, ARefusedWatchIsAHostErrorAndABoardWarning) {
   in_a_thread_of_its_own([&] {
     open_board();
     refuse(no_watches);
-    const std::string reason =
-        "the programs of this user wait for as many files and sockets as they may";
+    const std::string reason = "this user has reached the limit of epoll watches";
     EXPECT_EQ(host_problem(url_for_host(*board)).reason, reason);
     const FileDescriptor terminal = open_raw(board->name().substr(4));
     ASSERT_TRUE(run_until(io, [&] { return at_board.count(Kind::warning) != 0; }));

@@ -149,8 +149,8 @@ TEST_F(ShareHolderTest, RefusesASeventeenthProgramUntilAnotherEnds) {
   const auto one_too_many = opened_in(io, BoardRole::watch);
   ASSERT_TRUE(run_until(io, [&] { return one_too_many->heard.count(Kind::down) == 1; }));
   EXPECT_EQ(one_too_many->heard.last(Kind::down)->problem.text(),
-            "device:: 16 programs share it already, as many as may; end one of them; its place is "
-            "free at once");
+            "device:: 16 programs share it already, which is the limit; end one of these programs; "
+            "its place is free at once");
   run_for(io, 1200ms);  // the program tries again and gets the same answer
   EXPECT_EQ(one_too_many->heard.count(Kind::down), 1U);
   device.deliver("not for it");
@@ -213,7 +213,7 @@ TEST_F(ShareHolderTest, ContinuesIfTheSystemRefusesToWatchANewProgram) {
     EXPECT_TRUE(in_time([&] { return is_ended(late); }));
     EXPECT_TRUE(all_hear("state", watcher, holder));
     const auto told = program(BoardRole::watch, io);
-    EXPECT_TRUE(contains(problem_of([&] { told->open(); }).reason, "wait for as many files"))
+    EXPECT_TRUE(contains(problem_of([&] { told->open(); }).reason, "limit of epoll watches"))
         << "the system refuses the wait for the holder";
   });
 }

@@ -23,7 +23,7 @@ class SharedCarrier : public SharedTransportTest {
   const std::string stop = datagram_of("E", "STOP");
   const Problem unplugged{ErrorKind::open, "device:", "unplugged", "plug it in again"};
   const std::string silent =
-      fmt::format("the program that holds it (pid {}) does not answer", ::getpid());
+      fmt::format("the program that has it open (pid {}) does not answer", ::getpid());
 };
 
 TEST_F(SharedCarrier, IsHeldByTheFirstProgramUntilItCloses) {

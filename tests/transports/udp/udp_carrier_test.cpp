@@ -495,7 +495,7 @@ TEST_F(UdpTwoBoardsTest, RefuseTheSameBoardTwice) {
   const Problem problem =
       problem_of([&] { open_carrier(io, url(links[0]), Role::host, links[1].at_host); });
   EXPECT_EQ(problem.kind, ErrorKind::open);
-  EXPECT_EQ(problem.reason, "this program has that board open already");
+  EXPECT_EQ(problem.reason, "this program has already opened that board");
   EXPECT_FALSE(problem.fix.empty());
   links[0].host->close();
   open_carrier(io, url(links[0]), Role::host, links[1].at_host);

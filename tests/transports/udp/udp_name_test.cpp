@@ -112,7 +112,7 @@ TEST_F(UdpNameTest, OpenFailsIfTheNameServerDoesNotAnswerInTime) {
   const Problem problem = problem_of([&] { host->open(at_host); });
   EXPECT_LT(Clock::now() - begun, patience);
   EXPECT_EQ(problem.kind, ErrorKind::open);
-  EXPECT_TRUE(contains(problem.reason, "no name server answers"));
+  EXPECT_TRUE(contains(problem.reason, "the name server does not answer"));
   EXPECT_FALSE(problem.fix.empty());
 }
 
@@ -140,7 +140,7 @@ TEST_F(UdpNameTest, LookupIsRepeatedUntilItSucceeds) {
   ASSERT_TRUE(run_until(io, [&] { return names.asked() >= 5; }));
   ASSERT_EQ(at_host.count(Kind::down), 1U) << "reported once";
   const Problem& problem = at_host.last(Kind::down)->problem;
-  EXPECT_EQ(problem.reason, "there is no host 'board.test' (not known)");
+  EXPECT_EQ(problem.reason, "the host 'board.test' was not found (not known)");
   EXPECT_FALSE(problem.fix.empty());
   names.set("127.0.0.1");
   ASSERT_TRUE(run_until(io, [&] { return host->up(); }));

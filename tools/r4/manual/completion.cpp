@@ -232,7 +232,7 @@ void add_completion(CLI::App& root, Action& chosen) {
           "SHELL",
           [options](const std::string& shell) {
             if (shell != "bash" && shell != "zsh" && shell != "fish") {
-              throw Error(ErrorKind::usage, shell, "there is no completion for this shell",
+              throw Error(ErrorKind::usage, shell, "a completion for this shell does not exist",
                           "use bash, zsh or fish");
             }
             options->shell = shell;

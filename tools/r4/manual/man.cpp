@@ -33,7 +33,7 @@ void write_page(const CLI::App& root, const CLI::App& command, const std::string
   if (file) return;
   throw Error(errno == EACCES ? ErrorKind::permission : ErrorKind::open, path,
               fmt::format("cannot be written ({})", std::strerror(errno)),
-              "give a folder that is there and that you may write to");
+              "give an existing folder that you may write to");
 }
 
 int print_pages(const ManOptions& options) {
@@ -50,22 +50,22 @@ int print_pages(const ManOptions& options) {
     if (each->get_name() == options.command) shown = each;
   }
   if (shown == &root && !options.command.empty()) {
-    throw Error(ErrorKind::usage, options.command, "there is no such command",
-                "r4 --help lists them");
+    throw Error(ErrorKind::usage, options.command, "this is not a command",
+                "use a command that r4 --help lists");
   }
   print_raw(man_page(root, *shown));
   return 0;
 }
 
 constexpr const char* man_footer =
-    R"(It says what r4 --help and r4 COMMAND --help say. Where r4 is installed as a package, man r4-send shows it
-without this.
+    R"(The page has the same content as r4 --help and r4 COMMAND --help. If r4 is installed as a package,
+man r4-send shows the page without this command.
 
 Examples:
   r4 man send | man -l -
-  r4 man -o ~/.local/share/man/man1           all of them: r4.1, r4-send.1 …
+  r4 man -o ~/.local/share/man/man1           all pages: r4.1, r4-send.1 …
 
-Exit codes: 0 done; 2 no such command; 4, 5 a page cannot be written.)";
+Exit codes: 0 done; 2 the command does not exist; 4, 5 a page cannot be written.)";
 
 }  // namespace
 

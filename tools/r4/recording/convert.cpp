@@ -85,7 +85,7 @@ SourceOptions source_options(const ConvertOptions& options) {
   result.start = read_record_time(options.start);
   if (!result.start) {
     throw Error(ErrorKind::usage, "--start " + options.start, "is not a time in UTC",
-                "write it as in --start 2026-11-23T21:20:00");
+                "write a time such as --start 2026-11-23T21:20:00");
   }
   return result;
 }
@@ -112,13 +112,14 @@ int convert(const ConvertOptions& options) {
   Conversion conversion(*sink, [&](const RecordingDamage& damage) {
     if (++told > most_damage) return;
     progress.clear();
-    print_trouble("r4: {}: {}; it is left out", called(options.input), to_text(damage));
+    print_trouble("r4: {}: {}; this part is left out", called(options.input), to_text(damage));
   });
   read_file(options.input, conversion, source, advance);
   conversion.finish();
   output.finish();
   progress.clear();
-  if (told > most_damage) print_trouble("r4: and {} more", told - most_damage);
+  if (told > most_damage)
+    print_trouble("r4: {} more damaged parts are left out", told - most_damage);
   const std::string left_out = sink->left_out();
   print_text("{}: {} records{}\n", printable(options.output), conversion.records(),
              left_out.empty() ? "" : "; left out are " + printable(left_out));
@@ -126,33 +127,33 @@ int convert(const ConvertOptions& options) {
 }
 
 constexpr const char* convert_footer =
-    R"(FILE may be of any format that is read, compressed by zstd or not: what is in it tells which. The
-ending of the output's name tells what is written (docs/how-to/recordings.md):
-  .r4log .r4log.zst   the native one
-  .log                the frames of a CAN bus as candump -L writes them; of candump -tz, --start tells
-                      when the first frame was
-  .pcapng             packets that Wireshark opens, with all of the recording in them; read are
-                      also captures, of pcap too: UDP to and from --port, and SocketCAN
-  .mcap               a topic a board for Foxglove and PlotJuggler, with all of the recording
-                      in it; read is what r4 has made, also when other tools have copied it
-  .csv                the states, a row each, a column a value with its unit in the header
-  .jsonl              every record, a JSON object a line, as r4 decode shows it
+    R"(FILE may have any format that r4 convert reads, compressed by zstd or not: its content decides. The
+ending of the output's name selects the new format (docs/how-to/recordings.md):
+  .r4log .r4log.zst   the native format
+  .log                the frames of a CAN bus as candump -L writes them; for candump -tz, --start
+                      gives the time of the first frame
+  .pcapng             packets for Wireshark, with the whole recording in them; r4 convert also reads
+                      captures, and pcap: UDP to and from --port, and SocketCAN
+  .mcap               a topic for each board, for Foxglove and PlotJuggler, with the whole recording
+                      in it; r4 convert reads its own files, also after other tools copied them
+  .csv                the states, one row each; a column for each value, with its unit in the header
+  .jsonl              every record, one JSON object a line, as r4 decode shows it
 
-It takes no more memory for a long recording than for a short one. What cannot be read of a damaged
-file is told with its place, and the rest is converted. A file that is there is not replaced but with
---force.
+A long recording does not need more memory than a short recording. If parts of a damaged file cannot
+be read, r4 convert reports their places and converts the other parts. It replaces an existing file
+only with --force.
 
 Examples:
   r4 convert drive.r4log -o drive.csv
-  r4 convert drive.r4log -o drive.csv --device bno055@0x28:1    and what a sensor measured
+  r4 convert drive.r4log -o drive.csv --device bno055@0x28:1    with the values of a sensor
   r4 convert drive.r4log.zst -o drive.r4log
   r4 convert drive.r4log -o drive.pcapng && wireshark drive.pcapng
   tcpdump -w arm.pcap udp port 2018; r4 convert arm.pcap -o arm.csv
   zstdcat robot-*.r4log.zst | r4 convert - -o robot.jsonl
-  r4 convert bus.log -o bus.r4log --start 2026-11-23T21:20:00    of candump -tz
+  r4 convert bus.log -o bus.r4log --start 2026-11-23T21:20:00    from candump -tz
 
-Exit codes: 0 all of it was converted; 1 some could not be read, or it is not a recording; 2 usage; 4, 5 a
-file cannot be read or written.)";
+Exit codes: 0 all parts were converted; 1 some parts could not be read, or the file is not a
+recording; 2 usage; 4, 5 a file cannot be read or written.)";
 
 }  // namespace
 
@@ -161,19 +162,17 @@ void add_convert(CLI::App& root, Action& chosen) {
   CLI::App* const command =
       add_subcommand(root, chosen, "convert", "Write a recording in another format", convert_footer,
                      options, convert);
-  add_text(*command, "FILE", options->input, "a recording; - is the standard input", file_type,
+  add_text(*command, "FILE", options->input, "a recording, or - for standard input", file_type,
            Need::required);
-  add_text(*command, "-o,--output", options->output, "the file that is made", file_type,
-           Need::required);
+  add_text(*command, "-o,--output", options->output, "the new file", file_type, Need::required);
   add_number(*command, "--port", options->port, 1, 65535,
              "the boards' UDP port in a capture (default: 2018)");
   add_text(*command, "--start", options->start,
-           "when the first frame was, in UTC, of a log whose times count from it (candump -tz)",
-           "TIME");
+           "time of the first frame, in UTC, for a log with relative times (candump -tz)", "TIME");
   add_repeated(*command, "--device", options->devices,
-               "what it measured, to .csv, .jsonl and .mcap, for the recording's own (r4 devices)",
+               "add its values to .csv, .jsonl and .mcap (default: the recorded devices)",
                "NAME@ADDRESS");
-  add_flag(*command, "--force", options->force, "replace a file that is there");
+  add_flag(*command, "--force", options->force, "replace an existing file");
 }
 
 }  // namespace r4::tool

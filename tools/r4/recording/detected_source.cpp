@@ -41,7 +41,8 @@ void DetectedSource::finish() {
     decide(detect(true).value_or(named()));
   }
   if (zstd_ && !zstd_->between_frames()) {
-    visitor_.on_damage({RecordingDamage::Kind::torn, 0, taken_, "the compression was not ended"});
+    visitor_.on_damage(
+        {RecordingDamage::Kind::torn, 0, taken_, "the end of the compressed data is missing"});
   }
   source_->finish();
 }

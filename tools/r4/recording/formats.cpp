@@ -21,8 +21,8 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingVisitor& v
                                     const SourceOptions& options) {
   for (const std::string_view ending : {".csv", ".jsonl"}) {
     if (path.ends_with(ending)) {
-      throw Error(ErrorKind::usage, path, std::string(ending) + " is only written",
-                  "convert the recording that it was made of");
+      throw Error(ErrorKind::usage, path, std::string(ending) + " cannot be read, only written",
+                  "convert the original recording");
     }
   }
   return std::make_unique<DetectedSource>(visitor, called(path), options);
@@ -35,15 +35,16 @@ std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,
   if (name.ends_with(".jsonl")) return std::make_unique<JsonLinesSink>(output, std::move(devices));
   if (name.ends_with(".mcap")) return std::make_unique<McapSink>(output, std::move(devices));
   if (!devices.empty()) {
-    throw Error(ErrorKind::usage, "--device", "this format holds the bytes as the board sent them",
+    throw Error(ErrorKind::usage, "--device",
+                "this format holds only the bytes as the board sent them",
                 "convert to .csv, .jsonl or .mcap");
   }
   if (name.ends_with(".r4log")) return std::make_unique<NativeSink>(output, false);
   if (name.ends_with(".r4log.zst")) return std::make_unique<NativeSink>(output, true);
   if (name.ends_with(".log")) return std::make_unique<CandumpSink>(output);
   if (name.ends_with(".pcapng")) return std::make_unique<PcapngSink>(output);
-  throw Error(ErrorKind::usage, path, "no format has that ending",
-              "end it in .r4log, .r4log.zst, .csv, .jsonl, .log, .pcapng or .mcap");
+  throw Error(ErrorKind::usage, path, "the ending of the name is not known",
+              "use .r4log, .r4log.zst, .csv, .jsonl, .log, .pcapng or .mcap");
 }
 
 }  // namespace r4::tool

@@ -35,19 +35,20 @@ int info(const InfoOptions& options) {
 }
 
 constexpr const char* info_footer =
-    R"(Of each recording: from when to when; of each path the rate of its states, what was damaged and lost,
-the safe states and for how long, and gaps: times longer than a second in which the board said
-nothing. A file of another format that r4 convert reads is shown as the recording that it makes.
-Everything that can be read is read; where a line is damaged, its number and place are told, and the
-exit code is 1. The last line is torn where a recording was killed in the midst of it.
+    R"(For each recording: its start and end. For each path: the rate of its states, damaged and lost
+datagrams, the safe states and their duration, and gaps, which are times longer than a second
+without a datagram of the board. A file of another format that r4 convert reads is shown as the
+recording that it would become. r4 info reads all readable parts. It reports the number and place of
+each damaged line, and the exit code is then 1. If a recording program was killed, the last line may
+be incomplete.
 
 Examples:
   r4 info drive.r4log
   r4 info robot-*.r4log.zst --json | jq .paths
   zstdcat robot-00007.r4log.zst | r4 info -
 
-Exit codes: 0 all of it could be read; 1 some could not, or it is not a recording; 4, 5 the file cannot be
-read.)";
+Exit codes: 0 all parts could be read; 1 some parts could not be read, or the file is not a
+recording; 4, 5 the file cannot be read.)";
 
 }  // namespace
 
@@ -55,7 +56,7 @@ void add_info(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* const command =
       add_subcommand(root, chosen, "info", "Summarise a recording", info_footer, options, info);
-  add_texts(*command, "FILE", options->files, "recordings; - is the standard input", file_type,
+  add_texts(*command, "FILE", options->files, "recordings, or - for standard input", file_type,
             Need::required);
   add_json(*command, options->json, "print JSON, one object for each file");
 }

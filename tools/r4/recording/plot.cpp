@@ -54,7 +54,7 @@ Wanted to_wanted(const std::string& text) {
   const StateField field = state_field(Text(name));
   if (field == StateField::count) {
     throw Error(ErrorKind::usage, text, "is not a field of a state",
-                "name one of docs/reference/protocol.md, such as AIN24, OSMC1 or ENC1");
+                "use a field of docs/reference/protocol.md, such as AIN24, OSMC1 or ENC1");
   }
   return {colon == std::string::npos ? std::string() : text.substr(0, colon), field};
 }
@@ -63,8 +63,8 @@ std::string format_of(const std::string& path) {
   for (const char* format : {"svg", "png", "pdf"}) {
     if (path.ends_with(std::string(".") + format)) return format;
   }
-  throw Error(ErrorKind::usage, "--output " + path, "has no ending that tells what to draw",
-              "let it end in .svg, .png or .pdf");
+  throw Error(ErrorKind::usage, "--output " + path, "does not have the ending of a picture format",
+              "use a name that ends in .svg, .png or .pdf");
 }
 
 bool has_direction(StateField field) {
@@ -272,12 +272,12 @@ FilePointer draw(const FilePointer& plan) {
   std::optional<int> code = run_python("python3", plan, picture);
   if (!code || *code == no_matplotlib) code = run_python("/usr/bin/python3", plan, picture);
   if (!code || *code == no_matplotlib) {
-    throw Error(ErrorKind::unsupported, "matplotlib", "is not there, which draws the picture",
-                "as root: apt-get install python3-matplotlib");
+    throw Error(ErrorKind::unsupported, "matplotlib", "is not installed, and r4 plot needs it",
+                "run as root: apt-get install python3-matplotlib");
   }
   if (*code != 0) {
     throw Error(ErrorKind::unsupported, "matplotlib", "could not draw the picture",
-                "see above what it said");
+                "read the messages of matplotlib above");
   }
   return picture;
 }
@@ -296,8 +296,9 @@ int plot(const PlotOptions& options) {
              each.second.curves.contains(wanted[i].field);
     });
     if (found) continue;
-    throw Error(ErrorKind::data, options.fields[i], "is in no state of " + options.file,
-                "see `r4 info` for its boards; a program chooses the fields of its states (F)");
+    throw Error(
+        ErrorKind::data, options.fields[i], "does not occur in the states of " + options.file,
+        "check its boards with `r4 info`; a program requests state fields with the command F");
   }
   const FilePointer plan = make_plan(
       curves, wanted, options.file + ", from " + record_time_text(curves.first()), format);
@@ -309,23 +310,24 @@ int plot(const PlotOptions& options) {
   }
   output.finish();
   if (curves.damaged()) {
-    print_trouble("r4: {}: some of it could not be read; see r4 info", options.file);
+    print_trouble("r4: {}: some parts could not be read; see r4 info", options.file);
   }
   return curves.damaged() ? static_cast<int>(ErrorKind::data) : 0;
 }
 
 constexpr const char* plot_footer =
-    R"(A field is one of docs/reference/protocol.md, in capital or small letters. In a recording of several boards,
-left-arm:AIN24 names one board by its name, its URL or the number of its path. A drive is drawn with its
-direction, backward below zero. Fields with the same unit share an axis. Safe states, and pauses of more
-than a second without data, are shaded. It needs python3-matplotlib.
+    R"(The fields are those of docs/reference/protocol.md, in capital or small letters. In a recording of
+several boards, left-arm:AIN24 names one board by its name, its URL or the number of its path. A
+drive is drawn with its direction, backward below zero. Fields with the same unit share an axis.
+Safe states, and pauses of more than a second without data, are shaded. r4 plot needs
+python3-matplotlib.
 
 Examples:
   r4 plot drive.r4log AIN24 OSMC1 -o drive.svg
   r4 plot robot.r4log.zst left-arm:ENC1HZ right-arm:ENC1HZ -o arms.png
 
-Exit codes: 0 drawn; 1 drawn, but some could not be read, or it is not a recording, or has no such field;
-2 usage; 4, 5 a file cannot be read or written; 6 there is no matplotlib.)";
+Exit codes: 0 drawn; 1 drawn, but some parts could not be read, or the file is not a recording, or a
+field is missing; 2 usage; 4, 5 a file cannot be read or written; 6 matplotlib is missing.)";
 
 }  // namespace
 
@@ -333,13 +335,13 @@ void add_plot(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<PlotOptions>();
   CLI::App* const command = add_subcommand(root, chosen, "plot", "Draw fields of a recording",
                                            plot_footer, options, plot);
-  add_text(*command, "FILE", options->file, "a recording; - is the standard input", file_type,
+  add_text(*command, "FILE", options->file, "a recording, or - for standard input", file_type,
            Need::required);
-  add_texts(*command, "FIELD", options->fields, "what is drawn, such as AIN24", "FIELD",
+  add_texts(*command, "FIELD", options->fields, "the fields, such as AIN24", "FIELD",
             Need::required);
   add_text(*command, "-o,--output", options->output, "the picture: .svg, .png or .pdf", file_type,
            Need::required);
-  add_flag(*command, "--force", options->force, "replace a file that is there");
+  add_flag(*command, "--force", options->force, "replace an existing file");
 }
 
 }  // namespace r4::tool

@@ -59,8 +59,9 @@ class BusListener {
 
   void require_boards() const {
     if (std::find(heard_.begin(), heard_.end(), true) != heard_.end()) return;
-    throw Error(ErrorKind::refused, url_, "no board was heard",
-                "see that boards are connected and have this bus's bit rate; r4 list shows it");
+    throw Error(
+        ErrorKind::refused, url_, "no board was found on the bus",
+        "check that boards are connected and have the bit rate of this bus, which r4 list shows");
   }
 
  private:
@@ -105,7 +106,8 @@ class Recorders {
     print_text("{}: {} datagrams and events in {:.1f} s\n", options.file, recording_->records(),
                took.count());
     if (recording_->dropped() != 0) {
-      print_trouble("r4: {} more were left out: the disk is too slow", recording_->dropped());
+      print_trouble("r4: {} more datagrams and events were left out: the disk is too slow",
+                    recording_->dropped());
     }
     for (const auto& bus : buses_) bus->require_boards();
     boards_.require_heard();
@@ -145,28 +147,31 @@ class Recorders {
 int record(const RecordOptions& options) { return Recorders(options).run(options); }
 
 constexpr const char* record_footer =
-    R"(Every datagram of every board, in both directions, with the host's time and the path that it came
-by; damaged ones, too; and what happened to the links. It watches, as r4 monitor does: it takes no
-control, and a program that drives a board is not disturbed. It goes on when a transport is lost and
-comes back. If another program moves, removes or truncates the file, it is begun anew, and told of.
+    R"(Records every datagram of every board, in both directions, with the host's time and the path; also
+damaged datagrams and the events of the links. r4 record only watches, as r4 monitor does: it does
+not take control, and does not disturb a program that drives a board. It continues when a transport
+disconnects and reconnects. If another program moves, removes or truncates the file, r4 record
+starts a new file and reports this.
 
-The file is text, one line a datagram (docs/how-to/recordings.md); one whose name ends in .zst is compressed.
-A recording that is there goes on at its end. A crash costs at most the last second. With --rotate or
---keep the files are drive-00001.r4log, drive-00002.r4log …, each whole in itself.
+The file is text, one line for each datagram (docs/how-to/recordings.md); if its name ends in .zst,
+it is compressed. An existing recording is continued at its end. A crash costs at most the last
+second. With --rotate or --keep the files are drive-00001.r4log, drive-00002.r4log …, each complete
+in itself.
 
 Examples:
   r4 record udp://192.168.0.125 -o drive.r4log
   r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --duration 60
   r4 record serial:auto+udp://192.168.0.125 -o drive.r4log    one board, by both paths
   r4 record serial:auto -o drive.r4log --device bno055@0x28:1    which another program has set up
-  r4 record can://can0 -o bus.r4log     every board that is heard on the bus
+  r4 record can://can0 -o bus.r4log     every board on the bus
   r4 record 'udp://10.0.0.{1-30}?listen=0' -o lab.r4log.zst     thirty boards
   r4 record udp:auto -o /var/log/robot.r4log.zst --rotate 1h --rotate 100M --keep 2G
-  grep ' 1> ' drive.r4log               what was sent to the first board
-  r4 info drive.r4log                   what is in it
+  grep ' 1> ' drive.r4log               the datagrams to the first board
+  r4 info drive.r4log                   a summary of the recording
 
-Exit codes: 0 ended by --duration or Ctrl-C; 1 the file was removed or truncated meanwhile; 3 a board was
-not heard; 2 usage; 4 the file or the transport cannot be opened, or the disk is full; 5 permission denied.)";
+Exit codes: 0 ended by --duration or Ctrl-C; 1 the file was removed or truncated during recording; 3
+no datagram came from a board; 2 usage; 4 the file or the transport cannot be opened, or the disk is
+full; 5 permission denied.)";
 
 }  // namespace
 
@@ -179,13 +184,12 @@ void add_record(CLI::App& root, Action& chosen) {
   add_text(*command, "-o,--output", options->file, "the recording", file_type, Need::required);
   add_duration(*command, options->duration);
   add_repeated(*command, "--rotate", options->rotate,
-               "begin a new file after a size (100M) or a time (10min); give it twice for both",
-               "LIMIT");
-  add_text(*command, "--keep", options->keep, "remove the oldest files beyond that size (2G)",
-           "SIZE");
+               "start a new file after a size (100M) or a time (10min); twice for both", "LIMIT");
+  add_text(*command, "--keep", options->keep,
+           "remove the oldest files when all files exceed this size (2G)", "SIZE");
   add_fields(*command, options->fields);
   add_repeated(*command, "--device", options->devices,
-               "also the bytes of a described device, and what they mean (r4 devices)",
+               "also record the bytes of a described device and its description (r4 devices)",
                "NAME@ADDRESS");
   add_key(*command, options->key);
 }

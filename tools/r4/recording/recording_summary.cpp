@@ -178,8 +178,8 @@ std::string RecordingSummary::text(const std::string& name) const {
                  each.received + each.damaged, each.states, rate_of(each), each.damaged,
                  each.packets.counters().lost,
                  each.oversize == 0 ? "" : fmt::format(", {} too long", each.oversize)));
-    line("",
-         fmt::format("{} to it: {} heartbeats, {} stops", each.sent, each.heartbeats, each.stops));
+    line("", fmt::format("{} datagrams to the board: {} heartbeats, {} stops", each.sent,
+                         each.heartbeats, each.stops));
     if (!each.devices.empty()) line("", fmt::format("devices {}", fmt::join(each.devices, ", ")));
     std::string safe;
     for (std::size_t i = 1; i < each.safe_times.size(); ++i) {
@@ -190,15 +190,16 @@ std::string RecordingSummary::text(const std::string& name) const {
     if (!safe.empty())
       line("", fmt::format("safe for {:.1f} s{}", seconds_of(each.safe_for), safe));
     if (each.gaps != 0) {
-      line("", fmt::format("silent for more than {} s {} times; the longest {:.1f} s from {}",
-                           shortest_gap / std::chrono::seconds{1}, each.gaps,
-                           seconds_of(each.longest_gap), record_time_text(each.longest_gap_at)));
+      line("", fmt::format(
+                   "silent for more than {} s {} times; the longest silence was {:.1f} s from {}",
+                   shortest_gap / std::chrono::seconds{1}, each.gaps, seconds_of(each.longest_gap),
+                   record_time_text(each.longest_gap_at)));
     }
     if (each.downs != 0) line("", fmt::format("the transport was lost {} times", each.downs));
   }
   if (dropped_ != 0) line("left out", fmt::format("{} records: the disk was too slow", dropped_));
   const std::uint64_t cut = unended_ + (ended_ ? 0 : 1);
-  if (cut != 0) line("cut", "it was not ended: the recording program runs, or was killed");
+  if (cut != 0) line("cut", "the end is missing: the recording program still runs, or was killed");
   for (const Damage& each : damage_) {
     const std::string place = each.line == 0 ? "" : fmt::format("line {}, ", each.line);
     line("damage", fmt::format("{}byte {}: {}", place, each.offset, each.reason));

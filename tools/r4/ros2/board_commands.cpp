@@ -39,11 +39,11 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
     subscribe_drive(graph, node, inbox);
   } else {
     decline(graph, node, "cmd_vel",
-            "the motors of the wheels are not known; start r4 ros2 with --drive, as in --drive "
+            "the motors of the wheels are not known; start r4 ros2 with --drive, such as --drive "
             "osmc1,-osmc2");
   }
   decline(graph, node, "relay1/command",
-          "relay 1 is the motors' supply; it closes when the board is armed");
+          "relay 1 is the motors' supply, and closes when the board is armed");
   serve_all(graph, node, inbox);
   board_.on_state([this](const ReceivedState& state, const Datagram&) {
     drivers_.on_state(state, BootClock::now() - (Clock::now() - state.sampled));
@@ -79,8 +79,8 @@ bool BoardCommands::is_stale(const std::string& what, const Origin& origin) {
   if (Clock::now() - origin.written <= oldest) return false;
   ++stale_;
   warn(
-      fmt::format("{}: dropped: it was more than {} ms on its way; see what the network or this "
-                  "computer is busy with, and that the clocks of both computers go alike",
+      fmt::format("{}: dropped: the message took more than {} ms to arrive; check the load of the "
+                  "network and of this computer, and that the clocks of both computers agree",
                   what, oldest.count()));
   return true;
 }
@@ -91,8 +91,8 @@ std::string BoardCommands::objection_to(const Command& command) const {
     return {};
   }
   return fmt::format(
-      "{}: the board is not asked where that stepper is, so that nobody could stop it; add "
-      "STEP{}POS to --fields",
+      "{}: not sent: the board does not report the stepper's position, so r4 ros2 could not stop "
+      "the stepper; add STEP{}POS to --fields",
       shown(command), command.channel);
 }
 
@@ -156,7 +156,8 @@ void BoardCommands::on_tick() {
   Setpoints group;
   for (const Command& command : stop.commands) group.add(command);
   if (stop.missed) {
-    warn(fmt::format("{}: whoever drove it has gone or is silent", to_text(group)));
+    warn(fmt::format("{}: the publisher of the commands has disappeared or is silent",
+                     to_text(group)));
   }
   resting_ = true;
   board_.async_send(group, oldest, [this, stop](const CommandResult& result) {

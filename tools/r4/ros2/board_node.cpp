@@ -72,7 +72,7 @@ void BoardNode::connect() {
   });
   board_.on_restart([this] {
     ++boots_;
-    log(LogLevel::warning, "the board has begun again");
+    log(LogLevel::warning, "the board has restarted");
   });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) {
@@ -90,9 +90,9 @@ void BoardNode::on_link(const LinkStatus& link) {
     heard_ = heard;
     outbox_.push([topics = topics_, heard] { topics->on_active(heard); });
     log(heard ? LogLevel::info : LogLevel::warning,
-        heard ? "the board is there" : explain(board_.name(), link).text());
+        heard ? "the board is connected" : explain(board_.name(), link).text());
   }
-  if (link.in_control && !in_control_) log(LogLevel::info, "the board takes commands");
+  if (link.in_control && !in_control_) log(LogLevel::info, "the board accepts commands");
   in_control_ = link.in_control;
   tell_health();
   if (options_.arm && link.in_control && !armed_once_) {

@@ -17,7 +17,8 @@ using namespace std::chrono_literals;
 
 constexpr auto arm_patience = 3000ms;
 constexpr auto stop_patience = 5000ms;
-constexpr const char* overtaken = ": a stop came after it; ask again when the danger is over";
+constexpr const char* overtaken =
+    ": a stop came after the request; call the service again when the danger is over";
 
 template <class What>
 std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, What what,
@@ -146,7 +147,7 @@ void BoardCommands::repeat_stop() {
 
 void BoardCommands::arm_at_first() {
   if (stopped_ == Clock::time_point{}) return arm([](bool, const std::string&) {});
-  warn("--arm: a stop came first; arm when the danger is over");
+  warn("--arm: a stop came first; arm the board when the danger is over");
 }
 
 bool BoardCommands::is_without_link(const std::string& what, const Done& done) const {
@@ -172,7 +173,7 @@ void BoardCommands::clear(const Origin& origin, Done done) {
 void BoardCommands::arm(Done done) {
   if (is_without_link("arm", done)) return;
   if (arming_) {
-    done(false, "arm: it is being armed already");
+    done(false, "arm: the board is already being armed");
     return;
   }
   arming_ = true;
@@ -190,7 +191,8 @@ void BoardCommands::arm(Done done) {
 void BoardCommands::send(const std::optional<std::string>& text, const void* source,
                          const Origin& origin, const Done& done) {
   if (!text) {
-    done(false, "~/send: the text is not a valid command; write it as in O:358,1,1;S:1500,3");
+    done(false,
+         "~/send: the text is not a valid command; write commands such as O:358,1,1;S:1500,3");
     return;
   }
   if (asks_to_stop(*text)) {

@@ -53,13 +53,14 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
               [this](bool pressed, const Origin& origin) {
                 if (origin.writer == EntityId{}) {  // the button may have been pressed before
                   if (!pressed) return;
-                  return warn("arm: dropped: its publisher has gone; let it stay for a second");
+                  return warn(
+                      "arm: dropped: the publisher has disappeared; keep it alive for a second");
                 }
                 // Repeated presses must not arm again after a stop.
                 const bool edge = pressed_.on(origin.writer, pressed);
                 if (!edge || is_stale("arm", origin)) return;
                 if (is_overtaken(origin)) {
-                  warn("arm: a stop came after it; arm again when the danger is over");
+                  warn("arm: a stop came after this message; arm again when the danger is over");
                 } else {
                   arm([](bool, const std::string&) {});
                 }
@@ -111,7 +112,7 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
       want(command, source, origin);
     } else if (command.kind == CommandKind::clear) {
       if (is_overtaken(origin)) {
-        warn("E:CLEAR: a stop came after it; send it again when the danger is over");
+        warn("E:CLEAR: a stop came after this command; send E:CLEAR again when the danger is over");
       } else {
         clear(origin, [](bool, const std::string&) {});
       }
@@ -120,8 +121,9 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
       post_wanted();  // a transfer is sent alone, after earlier commands
       if (const PostResult result = board_.post(command); !result) tell(shown(command), result);
     } else {
-      warn(fmt::format("a command was dropped: more than {} at once that drive no output ({})",
-                       most_others, shown(command)));
+      warn(fmt::format(
+          "a command was dropped: more than {} commands without an output arrived at once ({})",
+          most_others, shown(command)));
     }
   }
 }
@@ -149,7 +151,8 @@ void BoardCommands::subscribe_output(Graph& graph, std::size_t node, Inbox& inbo
                 if (command) {
                   want(*command, source, origin);
                 } else {
-                  warn(fmt::format("{}: {} is out of range; it changes nothing", topic, value));
+                  warn(fmt::format("{}: {} is out of range, so the message is ignored", topic,
+                                   value));
                 }
               },
           .left = [this, source](const auto& there) { drivers_.on_publishers(source, there); },
@@ -234,7 +237,7 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
         if (!std::exchange(taken, true)) subscribe_stamped();
         return Mismatch{
             Mismatch::Weight::note,
-            fmt::format("cmd_vel: a publisher ({}) has the type {}, which is obeyed, too",
+            fmt::format("cmd_vel: a publisher ({}) has the type {}, which is also accepted",
                         writer.owner_text(), stamped.name)};
       });
 }
@@ -245,19 +248,19 @@ void BoardCommands::on_speed(const Speed& speed, const void* source, const Origi
       is_outdated(speed.stamp, std::chrono::system_clock::now(), options_.deadline)) {
     ++stale_;
     return warn(
-        fmt::format("cmd_vel: dropped: the stamp of its header is more than {} ms old; stamp it "
-                    "with the time of this computer, or with 0",
+        fmt::format("cmd_vel: dropped: the stamp of the header is more than {} ms old; use the "
+                    "time of this computer, or 0, as the stamp",
                     options_.deadline.count()));
   }
   const auto setpoints = options_.drive->setpoints(speed.linear, speed.angular);
-  if (!setpoints) return warn("cmd_vel: a speed is not a number; it changes nothing");
+  if (!setpoints) return warn("cmd_vel: a speed is not a number, so the message is ignored");
   for (std::size_t i = 0; i < setpoints->size(); ++i) want((*setpoints)[i], source, origin);
 }
 
 // Warns about topics that ROS users often publish but that would have no effect.
 void BoardCommands::decline(Graph& graph, std::size_t node, const char* topic, const char* why) {
   graph.on_other_type(node, topic, [topic, why](const Announced& writer) {
-    return Mismatch{Mismatch::Weight::lost, fmt::format("{}: a publisher ({}) is not heard: {}",
+    return Mismatch{Mismatch::Weight::lost, fmt::format("{}: a publisher ({}) is not received: {}",
                                                         topic, writer.owner_text(), why)};
   });
 }

@@ -54,14 +54,14 @@ NodeOptions node_options(const BridgeOptions& options) {
   }
   if (options.drive.empty()) {
     if (!options.separation.empty() || !options.full_speed.empty()) {
-      throw Error(ErrorKind::usage, "--wheel-separation, --full-speed", "say nothing alone",
-                  "name the two motor channels, too: --drive osmc1,osmc2");
+      throw Error(ErrorKind::usage, "--wheel-separation, --full-speed", "need the option --drive",
+                  "also name the two motor channels: --drive osmc1,osmc2");
     }
     return node;
   }
   if (options.separation.empty() || options.full_speed.empty()) {
     throw Error(ErrorKind::usage, "--drive " + options.drive,
-                "needs to know how far apart the wheels are, and how fast they can be",
+                "needs the distance between the wheels, and their full speed",
                 "add --wheel-separation METRES --full-speed METRES_A_SECOND");
   }
   node.drive =
@@ -170,9 +170,11 @@ class Bridge {
       const std::string ours = full_name(urls_.front().name, topic);
       const char* const more = urls_.size() > 1 ? ", and so on for each board" : "";
       graph_.on_other_type(0, "/" + topic, [topic, ours, more](const Announced& writer) {
-        return Mismatch{Mismatch::Weight::warning,
-                        fmt::format("/{}: a publisher ({}) is not heard here; publish {}{}", topic,
-                                    writer.owner_text(), ours, more)};
+        return Mismatch{
+            Mismatch::Weight::warning,
+            fmt::format(
+                "/{}: a publisher ({}) uses a topic that r4 ros2 does not receive; publish {}{}",
+                topic, writer.owner_text(), ours, more)};
       });
     }
   }
@@ -204,8 +206,8 @@ class Bridge {
 
   void warn_of(std::size_t node, const std::string& who) {
     nodes_[node]->warn(fmt::format(
-        "{} has a node {}, too: what is commanded reaches the boards of both; give one of them "
-        "another --namespace, or end it (who was killed is gone after 10 s)",
+        "{} also has a node {}, so commands reach the boards of both nodes; give one node another "
+        "--namespace, or end its program (a killed program disappears after 10 s)",
         who, nodes_[node]->name()));
   }
 

@@ -31,15 +31,16 @@ void each_part(std::string_view text, Part part) {
 void require_allowed(std::string_view text, const Command& command) {
   switch (command.kind) {
     case CommandKind::setting:
-      throw Error(ErrorKind::usage, shown(text), "settings are not taken from a topic",
-                  "r4 send URL " + shown(text) + " sets it");
+      throw Error(ErrorKind::usage, shown(text), "a topic cannot change settings",
+                  "use r4 send URL " + shown(text));
     case CommandKind::fields:  // a stepper without a reported position cannot be stopped
-      throw Error(ErrorKind::usage, shown(text), "fields are not chosen from a topic",
-                  "name them by --fields");
+      throw Error(ErrorKind::usage, shown(text), "a topic cannot choose state fields",
+                  "choose the fields with --fields");
     case CommandKind::heartbeat:
     case CommandKind::leave:
     case CommandKind::watch:
-      throw Error(ErrorKind::usage, shown(text), "is said by r4 ros2 itself", "leave it out");
+      throw Error(ErrorKind::usage, shown(text), "is sent by r4 ros2 itself",
+                  "leave this command out");
     default:
       break;
   }
@@ -62,8 +63,8 @@ bool asks_to_stop(std::string_view text) {
 
 std::vector<OwnCommand> commands_of(std::string_view text) {
   if (!std::all_of(text.begin(), text.end(), is_ascii)) {  // unreadable in /rosout
-    throw Error(ErrorKind::usage, "a command", "has characters that no command has",
-                "write it in ASCII");
+    throw Error(ErrorKind::usage, "a command", "has characters that are not ASCII",
+                "write the command in ASCII");
   }
   std::vector<OwnCommand> commands;
   each_part(text, [&commands](std::string_view part) {
@@ -76,7 +77,8 @@ std::vector<OwnCommand> commands_of(std::string_view text) {
 
 Problem for_a_node(Problem problem, DisarmCause cause) {
   if (is_earlier(cause))
-    problem.fix = "clear it on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm";
+    problem.fix =
+        "clear the cause on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm";
   return problem;
 }
 

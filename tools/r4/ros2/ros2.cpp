@@ -10,19 +10,19 @@ namespace r4::tool {
 namespace {
 
 constexpr const char* footer =
-    R"(Joins the ROS 2 graph as the node /r4, without ROS being installed: the paper's topics R4, R4_Heart_Beat,
-R4_Active and R4_Command (std_msgs/String), a topic for each component, diagnostics, and the services ~/stop,
-~/clear, ~/arm and ~/send (for clients with rmw_cyclonedds). docs/how-to/ros2.md lists the topics with
-their units, and shows how to drive a robot by cmd_vel.
+    R"(Joins the ROS 2 graph as the node /r4, even if ROS is not installed: the paper's topics R4,
+R4_Heart_Beat, R4_Active and R4_Command (std_msgs/String), a topic for each component, diagnostics,
+and the services ~/stop, ~/clear, ~/arm and ~/send (for clients with rmw_cyclonedds).
+docs/how-to/ros2.md lists the topics with their units, and shows how to drive a robot with cmd_vel.
 
-Outputs stay off until the board is armed: once by --arm, when the board is found; by true on the topic
-arm; or by the service ~/arm. After a stop or a fault, arm again. If the stop or the fault came before this
-program began, clear it first: by ~/clear, or by E:CLEAR on R4_Command. The outputs of a publisher are
-switched off when it disappears, or is silent for --deadline. With several boards, each has a namespace:
-board1, board2 …, or the numbers of a pattern.
+Outputs stay off until the board is armed: once by --arm, when the board is found; by true on the
+topic arm; or by the service ~/arm. After a stop or a fault, arm again. If the stop or the fault
+came before this program began, clear it first: by ~/clear, or by E:CLEAR on R4_Command. The outputs
+of a publisher are switched off when it disappears, or is silent for --deadline. With several
+boards, each board has a namespace: board1, board2 …, or the numbers of a pattern.
 
-The graph is that of ROS_DOMAIN_ID, on this computer alone unless ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET,
-ROS_STATIC_PEERS or CYCLONEDDS_URI allow more.
+ROS_DOMAIN_ID selects the graph. The graph is limited to this computer, unless
+ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET, ROS_STATIC_PEERS or CYCLONEDDS_URI allow more.
 
 Examples:
   r4 ros2 serial:auto
@@ -43,27 +43,27 @@ void add_ros2(CLI::App& root, Action& chosen) {
       add_subcommand(root, chosen, "ros2", "Connect boards to ROS 2, without ROS", footer, options,
                      ros2::run_bridge);
   add_boards(*command, options->urls);
-  add_text(*command, "--name", options->name, "the node's name (default r4)", "NAME");
-  add_text(*command, "--namespace", options->space, "its namespace (default /)", "NAME");
-  add_flag(*command, "--arm", options->arm, "arm as soon as the board is there, once");
+  add_text(*command, "--name", options->name, "name of the node (default r4)", "NAME");
+  add_text(*command, "--namespace", options->space, "namespace of the node (default /)", "NAME");
+  add_flag(*command, "--arm", options->arm, "arm the board once, as soon as it is connected");
   add_seconds(*command, "--deadline", options->deadline,
-              "of a publisher that drives (default 1, as the board's timeout); 0: none",
+              "longest silence of a driving publisher (default 1, as the board); 0: no limit",
               Zero::allowed);
-  add_text(*command, "--drive", options->drive, "the two motor channels of cmd_vel, left and right",
+  add_text(*command, "--drive", options->drive, "the left and right motor channel for cmd_vel",
            "LEFT,RIGHT");
   add_text(*command, "--wheel-separation", options->separation, "metres between the two wheels",
            "METRES");
   add_text(*command, "--full-speed", options->full_speed, "metres a second of a wheel at full duty",
            "SPEED");
   add_text(*command, "--servo", options->servo,
-           "us, or MIN_US,MAX_US,RADIANS (default 500,2500,3.14159)", "SERVO");
+           "us, or radians as MIN_US,MAX_US,RADIANS (default 500,2500,3.14159)", "SERVO");
   add_text(*command, "--counts-per-turn", options->counts_per_turn,
-           "of the encoders, for joint_states", "COUNTS");
+           "counts of the encoders in one turn, for joint_states", "COUNTS");
   add_text(*command, "--steps-per-turn", options->steps_per_turn,
-           "of the steppers, for joint_states", "STEPS");
-  add_fields(*command, options->fields, "state fields to ask for: what topics there are");
+           "steps of the steppers in one turn, for joint_states", "STEPS");
+  add_fields(*command, options->fields, "state fields to request; they determine the topics");
   add_repeated(*command, "--device", options->devices,
-               "a described one on the user's I2C bus, such as bno055@0x28: a topic of its own",
+               "add a topic for a described device on the I2C bus, such as bno055@0x28",
                "NAME@ADDRESS");
   add_duration(*command, options->duration);
   add_key(*command, options->key);

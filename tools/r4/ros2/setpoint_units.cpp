@@ -68,7 +68,7 @@ ServoUnit servo_unit(std::string_view text) {
                      max_us <= servo_max_us && angle > 0 && angle < 100;
   if (!valid) {
     throw Error(ErrorKind::usage, "--servo " + std::string(text), "is not a valid calibration",
-                "write us, or two pulse widths and the angle between them in radians, as in "
+                "write us, or two pulse widths and the angle between them in radians, such as "
                 "500,2500,3.14");
   }
   const double half = angle / 2 * degrees_a_radian;
@@ -120,10 +120,10 @@ DifferentialDrive differential_drive(std::string_view channels, double separatio
   const auto right = parts.size() == 2 ? motor_channel(parts[1]) : std::nullopt;
   const bool same = left && right && left->kind == right->kind && left->channel == right->channel;
   if (!left || !right || same) {
-    throw Error(
-        ErrorKind::usage, "--drive " + std::string(channels), "does not name two motor channels",
-        "name the left and the right one, as in osmc1,-osmc2 or dhb12_1,dhb12_2; - is for a "
-        "motor that is mounted the other way round");
+    throw Error(ErrorKind::usage, "--drive " + std::string(channels),
+                "does not name two motor channels",
+                "name the left and the right channel, such as osmc1,-osmc2 or dhb12_1,dhb12_2; "
+                "write - for a motor that is mounted in reverse");
   }
   return {*left, *right, separation_m, full_speed_mps};
 }
@@ -155,7 +155,7 @@ double positive_number(std::string_view name, std::string_view text) {
   double number = 0;
   if (read(text, number) && std::isfinite(number) && number > 0) return number;
   throw Error(ErrorKind::usage, std::string(name) + " " + std::string(text),
-              "is not a number greater than 0", "write it as in 0.42");
+              "is not a number greater than 0", "write a number such as 0.42");
 }
 
 }  // namespace r4::tool::ros2

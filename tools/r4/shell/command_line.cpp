@@ -86,15 +86,15 @@ Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
   if (unexpected && !extras.empty()) {
     problem.thing = extras.front();
     const bool option = problem.thing.starts_with('-');
-    problem.reason = option         ? "no such option"
-                     : used.empty() ? "no such command"
-                                    : "one argument too many";
+    problem.reason = option         ? "this is not an option"
+                     : used.empty() ? "this is not a command"
+                                    : "this is one argument too many";
     const std::string near = nearest_name(command, problem.thing);
-    if (!near.empty()) problem.fix = fmt::format("did you mean {}? {} lists them", near, help);
+    if (!near.empty()) problem.fix = fmt::format("did you mean {}? see {}", near, help);
   } else if (used.empty()) {
     problem.thing = "command";
-    problem.reason = "none was given";
-    problem.fix = "r4 --help lists them; r4 demo shows what this is about";
+    problem.reason = "the command is missing";
+    problem.fix = "give a command that r4 --help lists; r4 demo explains R4";
   } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
     problem.thing = without(error.what(), " is required");
     problem.reason = "is missing";
@@ -106,8 +106,8 @@ Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
     constexpr std::string_view between = " excludes ";
     const std::size_t at = text.find(between);
     problem.thing = text.substr(at + between.size());
-    problem.reason = "does not go with " + text.substr(0, at);
-    problem.fix = fmt::format("leave one of the two out; {} tells what they are for", help);
+    problem.reason = "cannot be combined with " + text.substr(0, at);
+    problem.fix = fmt::format("leave out one of the two; {} explains both", help);
   } else {
     const std::string_view text = error.what();
     const std::size_t colon = text.find(": ");

@@ -93,18 +93,18 @@ std::string command_table() {
 }
 
 std::string root_footer() {
-  return "First steps: r4 sim in one terminal, then in another one\n"
+  return "First steps: start r4 sim in one terminal, then in another terminal\n"
          "  r4 sim                          a simulated board, at udp://127.0.0.1:2018\n"
-         "  r4 monitor udp://127.0.0.1      its state, a hundred times a second\n"
+         "  r4 monitor udp://127.0.0.1      the board's state, a hundred times a second\n"
          "  r4 send udp://127.0.0.1 R:1,On O:358,1,1 --hold 5\n"
          "                                  motor 1 forward at 358 of 4095, for five seconds\n"
-         "  r4 demo                         all of it explained, over every transport\n"
-         "\nURLs, where a board is or where a simulated one listens:\n" +
+         "  r4 demo                         an explanation, over every transport\n"
+         "\nURLs of a board, or of the place where a simulated board listens:\n" +
          url_table() +
          "\nExit codes:\n"
          "  0 done    1 a datagram or file is bad    2 wrong usage    3 refused, or not in time\n"
          "  4 the transport cannot be opened    5 permission denied    6 the kernel lacks support\n"
-         "\nAn error is one line on stderr, \"r4: thing: reason; fix\"; with --json also an "
+         "\nAn error is one line on stderr, \"r4: thing: reason; fix\". With --json it is also an "
          "object.";
 }
 

@@ -32,8 +32,8 @@ CLI::Option* add_key_option(CLI::App& command, const std::string& help,
           "--key",
           [take = std::move(take)](const std::string& text) {
             if (text.empty()) {
-              throw Error(ErrorKind::usage, "--key", "names no file",
-                          "write --key FILE, or leave it out");
+              throw Error(ErrorKind::usage, "--key", "does not name a file",
+                          "write --key FILE, or leave --key out");
             }
             take(text);
           },
@@ -55,8 +55,8 @@ void make_key_file(const std::string& path, std::uint8_t id) {
   const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (file < 0) {
     throw system_error(path, errno,
-                       errno == EEXIST ? "choose another name; a key is never overwritten"
-                                       : "choose a place that can be written");
+                       errno == EEXIST ? "choose another name, because a key is never overwritten"
+                                       : "choose a folder that you may write to");
   }
   const auto written = ::write(file, text.data(), text.size());
   const bool kept = written == static_cast<ssize_t>(text.size()) && ::fsync(file) == 0;
@@ -64,7 +64,7 @@ void make_key_file(const std::string& path, std::uint8_t id) {
   ::close(file);
   if (!kept) {
     ::unlink(path.c_str());
-    throw system_error(path, error, "make room, then again");
+    throw system_error(path, error, "free some disk space, then try again");
   }
 }
 
@@ -74,8 +74,7 @@ CLI::Option* add_key(CLI::App& command, std::string& path) {
 }
 
 CLI::Option* add_keys(CLI::App& command, std::vector<std::string>& paths) {
-  return add_key_option(command,
-                        "a key file of the board's (default: $R4_KEY); may be given several times",
+  return add_key_option(command, "a key file of the board (default: $R4_KEY); may be repeated",
                         [&paths](const std::string& text) { paths.push_back(text); })
       ->trigger_on_parse()
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);

@@ -31,7 +31,7 @@ Milliseconds read_seconds(const std::string& name, const std::string& text, Zero
   const Milliseconds time = std::chrono::round<std::chrono::duration<std::int64_t, std::centi>>(
       std::chrono::duration<double>(value));
   if (time.count() == 0 && zero == Zero::refused) {
-    throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is too short for anything",
+    throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is too short",
                 "write seconds such as 5 or 0.25");
   }
   return time;
@@ -79,9 +79,9 @@ CLI::Option* url(CLI::App& command, Out& out, const char* meaning) {
 }
 
 constexpr const char* paths_meaning =
-    "where the board is, such as udp://192.168.0.125; several are paths to it";
+    "URL of the board, such as udp://192.168.0.125; several URLs are paths to one board";
 constexpr const char* boards_meaning =
-    "where boards are, such as udp://192.168.0.125; a + joins the paths to one of them";
+    "URLs of boards, such as udp://192.168.0.125; a + joins the paths to one board";
 
 }  // namespace
 
@@ -161,12 +161,12 @@ void take_paths(std::string& url, std::vector<std::string>& words, const std::st
   for (auto word = words.begin(); word != first; ++word) url += "+" + *word;
   words.erase(words.begin(), first);
   if (words.empty()) {
-    throw Error(ErrorKind::usage, what, "is missing", "name it behind " + url);
+    throw Error(ErrorKind::usage, what, "is missing", "write it after " + url);
   }
   const auto late = std::find_if(words.begin(), words.end(), is);
   if (late == words.end()) return;
-  throw Error(ErrorKind::usage, *late, "a URL cannot stand behind " + words.front(),
-              "write all paths to the board in front");
+  throw Error(ErrorKind::usage, *late, "a URL cannot follow " + words.front(),
+              "write all URLs of the board first");
 }
 
 bool is_url(std::string_view text) {
@@ -184,7 +184,7 @@ CLI::Option* add_fields(CLI::App& command, std::string& out, const std::string& 
             FieldSet set;
             if (parse_fields(Text(text), set) != Refusal::none) {
               throw Error(
-                  ErrorKind::usage, "--fields " + text, "there is no such state field",
+                  ErrorKind::usage, "--fields " + text, "this is not a list of state fields",
                   "use " + command_help(CommandKind::fields).ranges + ", separated by commas");
             }
             out = text;

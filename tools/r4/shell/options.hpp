@@ -25,7 +25,7 @@ CLI::Option* add_seconds(CLI::App& command, const std::string& name, Millisecond
 CLI::Option* add_seconds(CLI::App& command, const std::string& name,
                          std::optional<Milliseconds>& out, const std::string& meaning);
 void add_duration(CLI::App& command, std::optional<Milliseconds>& out,
-                  const std::string& meaning = "end after that time");
+                  const std::string& meaning = "end after this time");
 void add_duration(CLI::App& command, Milliseconds& out, const std::string& meaning);
 
 // `type` is the value's name in the help and the completion.
@@ -68,7 +68,7 @@ bool is_url(std::string_view text);
 
 CLI::Option* add_fields(
     CLI::App& command, std::string& out,
-    const std::string& meaning = "state fields to ask for, such as DEFAULT,ENC1,US1 or ALL");
+    const std::string& meaning = "state fields to request, such as DEFAULT,ENC1,US1 or ALL");
 
 // Type names for which the completion scripts offer values.
 inline constexpr const char* url_type = "URL";

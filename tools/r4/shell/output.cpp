@@ -73,7 +73,7 @@ void print_trouble(std::string_view text) {
 void require_output() {
   if (first_error == 0) return;
   throw Error(ErrorKind::open, "standard output", std::strerror(first_error),
-              "make room where it goes, or send it elsewhere");
+              "free some disk space, or write the output to another place");
 }
 
 LineWriter::LineWriter(std::size_t room, std::function<std::string(std::uint64_t count)> note)

@@ -43,7 +43,7 @@ pid_t spawn(const std::string& url, int output) {
   if (error != 0) {
     throw Error(ErrorKind::open, "r4 sim " + url,
                 std::string("cannot be started: ") + std::strerror(error),
-                "see that /proc is mounted and that there is memory");
+                "check that /proc is mounted, and that memory is free");
   }
   return pid;
 }

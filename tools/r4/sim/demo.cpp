@@ -73,8 +73,9 @@ bool decode_capture(bool json) {
     if (result) {
       print(fmt::format("      {} ({}), valid", each.meaning, to_text(kind_of(datagram))));
     } else {
-      print(fmt::format("      {}: its bytes have the checksum {:#x}, it claims {:#x}: thrown away",
-                        each.meaning, result.crc_expected, result.crc_found));
+      print(
+          fmt::format("      {}: its bytes have the checksum {:#x}, but it contains {:#x}: dropped",
+                      each.meaning, result.crc_expected, result.crc_found));
     }
     if (!as_expected) print("      THIS IS NOT AS EXPECTED");
   }
@@ -92,7 +93,7 @@ class SeparateBoard {
     }
     if (host_url_.empty()) {
       throw Error(ErrorKind::open, "r4 sim " + url, "does not listen",
-                  "try it in another terminal");
+                  "try this command in another terminal");
     }
   }
 
@@ -135,9 +136,8 @@ std::string virtual_can() {
 std::vector<Stage> stages(std::optional<Problem>& missing) {
   std::vector<Stage> all{
       {"in process", "Within this program (sim:)", ""},
-      {"UDP", "Over UDP, as by WiFi: host and board are two processes now", "udp://127.0.0.1:0"},
-      {"serial", "Over a serial line (a pseudo-terminal, which stands for USB): two processes",
-       "pty:"},
+      {"UDP", "Over UDP, as over WiFi: host and board are now two processes", "udp://127.0.0.1:0"},
+      {"serial", "Over a serial line (a pseudo-terminal instead of USB): two processes", "pty:"},
   };
   const std::string interface = virtual_can();
   if (!interface.empty()) {
@@ -202,9 +202,8 @@ void print_table(const std::vector<StoryResult>& results, const std::optional<Pr
   }
   print(
       "  command: sent until seen in the board's state, which comes every 10 ms\n"
-      "  silence to safe: promised are 1000 ms + 20 ms; where the board is another process, timed "
-      "by\n"
-      "  its own log");
+      "  silence to safe: at most 1000 ms + 20 ms; if the board is another process, its log has\n"
+      "  the time");
 }
 
 int demo(const DemoOptions& options) {
@@ -234,19 +233,19 @@ int demo(const DemoOptions& options) {
   }
   if (!options.json) {
     print_table(results, missing);
-    print(good ? "\nAll of it was true. Next: r4 --help"
-               : "\nSomething was not true, see NOT OK above.");
+    print(good ? "\nEvery step was true. Next: r4 --help"
+               : "\nAt least one step was not true: see NOT OK above.");
   }
   return good ? 0 : static_cast<int>(ErrorKind::refused);
 }
 
 constexpr const char* demo_footer =
-    R"(Starts simulated boards by itself: in this process, and others as processes of their own, reached over
-UDP and over a pseudo-terminal. Nothing is needed but this program. Where a virtual CAN interface
-(vcan0) is up, a third is reached over that, as node 31; its emergency stop is heard by every simulated
-board on it. Other CAN interfaces are left alone: there may be motors behind them.
+    R"(Starts simulated boards: one in this process, and two in their own processes, reached over UDP and
+over a pseudo-terminal. Only this program is needed. If a virtual CAN interface (vcan0) is up,
+another board is reached over it, as node 31. Its emergency stop reaches every simulated board on
+that interface. The demo does not use other CAN interfaces, because motors may be connected to them.
 
-Exit codes: 0 every step was true; 3 at least one was not.)";
+Exit codes: 0 every step was true; 3 at least one step was not true.)";
 
 }  // namespace
 

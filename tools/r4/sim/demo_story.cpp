@@ -119,13 +119,14 @@ void Story::connect() {
   const bool heard = wait_until([this] { return active() && states_ != 0; }, patience);
   if (!heard) throw Error(explain(board_.name(), board_.link()));
   result_.connect_ms = milliseconds(Clock::now() - start);
-  teller_.say(fmt::format(
-      "connect   The host sent a heartbeat, the board answered and handed it control: {:.0f} ms.",
-      result_.connect_ms));
+  teller_.say(
+      fmt::format("connect   The host sent a heartbeat. The board answered, and the host has "
+                  "control: {:.0f} ms.",
+                  result_.connect_ms));
 }
 
 void Story::stream() {
-  teller_.say("stream    Now the board tells its state a hundred times a second:");
+  teller_.say("stream    Now the board sends its state a hundred times a second:");
   const std::uint64_t first = states_;
   const Clock::time_point start = state_came_;
   const std::uint32_t start_t_ms = state_.t_ms;
@@ -152,26 +153,26 @@ void Story::ask() {
   std::nth_element(times.begin(), times.begin() + questions / 2, times.end());
   result_.round_trip_us = times[questions / 2];
   const BoardIdentity& id = board_.identity();
-  teller_.say(
-      fmt::format("ask       Who are you? Board {}, firmware {}. Question to answer: {:.0f} us.",
-                  id.board_id, id.firmware, result_.round_trip_us));
+  teller_.say(fmt::format(
+      "ask       The host asks for the identity: board {}, firmware {}. Round trip: {:.0f} us.",
+      id.board_id, id.firmware, result_.round_trip_us));
 }
 
 void Story::command() {
   send(Command::fields("DEFAULT,ENC1"));
   send(Command::relay(1, true));
   teller_.say(
-      "supply    R:1,On closes relay 1: it is in the motors' supply, and opens in every safe "
+      "supply    R:1,On closes relay 1, which is in the motors' supply and opens in every safe "
       "state.");
   result_.confirmed_ms = milliseconds_of(send(Command::osmc(1, Pwm(358), Direction::forward)));
   require(state_.osmc(1) == commanded, "the state does not show the command");
   teller_.say(
       "command   O:358,1,1 sets motor 1 (OSMC1) to 358 of 4095, forward. The state shows it:");
   teller_.show(state_bytes_);
-  teller_.say(
-      fmt::format("          That is the confirmation, after {:.1f} ms.", result_.confirmed_ms));
+  teller_.say(fmt::format("          This state confirms the command, after {:.1f} ms.",
+                          result_.confirmed_ms));
   require_that_the_motor_turns();
-  teller_.say("          The motor turns; the encoder on its shaft (ENC1) counts:");
+  teller_.say("          The motor turns, and the encoder on its shaft (ENC1) counts:");
   teller_.show(state_bytes_);
 }
 
@@ -192,18 +193,18 @@ void Story::fall_silent() {
     last = Clock::now();
     return true;
   };
-  require(wait_until(sent_another, patience), "the host sends no heartbeats");
+  require(wait_until(sent_another, patience), "the host does not send heartbeats");
   board_.watchdog(Milliseconds(1));
   const auto board_is_safe = [&] {
     sent_another();
     return board_.link().state == HostLinkState::safe && board_.link().reason == SafeReason::link;
   };
   require(wait_until(board_is_safe, patience),
-          "the board did not go safe when the host fell silent");
+          "the board did not go safe when the heartbeats stopped");
   const State last_state = state_;
   if (log_ != nullptr) {
     require(wait_until([this] { return log_->silence_ms && log_->outputs_off; }, patience),
-            "the board's log does not tell of a safe state");
+            "the board's log does not report a safe state");
     result_.safe_ms = *log_->silence_ms;
     result_.safe_by_event = true;
   } else {
@@ -212,11 +213,12 @@ void Story::fall_silent() {
     result_.safe_ms = static_cast<double>(safe_t_ms_ - last_state.t_ms) + age_ms;
   }
   teller_.say(
-      "silence   The host stops its heartbeats, as if the program hung. The board waits one "
-      "second, then:");
+      "silence   The host stops its heartbeats, as a hung program would. The board waits one "
+      "second:");
   teller_.show(safe_bytes_);
-  teller_.say(fmt::format("          SAFE:1, every output off, {:.0f} ms after the last heartbeat.",
-                          result_.safe_ms));
+  teller_.say(
+      fmt::format("          SAFE:1: every output is off, {:.0f} ms after the last heartbeat.",
+                  result_.safe_ms));
   require(result_.safe_ms <= timeout_ms + held_up_ms, "the board went safe too late");
   // Without the log the time may be too short, if this computer was delayed.
   require(!result_.safe_by_event || result_.safe_ms >= timeout_ms, "the board went safe too early");
@@ -229,7 +231,8 @@ void Story::recover() {
   const auto is_back = [&] { return active() && states_ > before && state_.osmc(1) == commanded; };
   require(wait_until(is_back, patience), "the last command was not restored");
   result_.recovered_ms = milliseconds(Clock::now() - start);
-  teller_.say("recovery  Heartbeats again: the board takes up its last command by itself:");
+  teller_.say(
+      "recovery  The heartbeats return, and the board restores its last command by itself:");
   teller_.show(state_bytes_);
   teller_.say(fmt::format("          {:.0f} ms after the first heartbeat.", result_.recovered_ms));
   require_that_the_motor_turns();
@@ -241,12 +244,12 @@ void Story::stop() {
     return state_.safe == SafeReason::stop && state_.osmc(1) == Drive();
   };
   require(wait_until(is_off, patience), "the state does not show the stop");
-  teller_.say("stop      E:STOP, the emergency stop, which the board obeys from anyone:");
+  teller_.say("stop      E:STOP is the emergency stop. The board obeys it from every program:");
   teller_.show(state_bytes_);
-  teller_.say(fmt::format(
-      "          SAFE:2, motor off and relay 1 open, confirmed after {:.1f} ms; latched until "
-      "E:CLEAR.",
-      result_.stop_ms));
+  teller_.say(
+      fmt::format("          SAFE:2: motor off and relay 1 open, confirmed after {:.1f} ms. It "
+                  "lasts until E:CLEAR.",
+                  result_.stop_ms));
 }
 
 void Story::clear() {
@@ -254,7 +257,7 @@ void Story::clear() {
   const std::uint64_t before = states_;
   require(wait_until([&] { return active() && states_ > before; }, patience),
           "E:CLEAR did not clear the stop");
-  require(state_.osmc(1) == Drive(), "a command came back after an emergency stop");
+  require(state_.osmc(1) == Drive(), "a command was restored after an emergency stop");
   teller_.say(
       "clear     E:CLEAR allows it to move again. Nothing comes back by itself: the motor is off, "
       "and "

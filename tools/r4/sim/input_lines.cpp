@@ -31,7 +31,7 @@ InputLines::InputLines(asio::io_context& io, std::function<void(const std::strin
   const int input = open_input();
   if (input < 0) {
     throw Error(ErrorKind::open, "standard input", std::strerror(errno),
-                "give it a terminal, a pipe or a file to read");
+                "connect standard input to a terminal, a pipe or a file");
   }
   with_system_errors("standard input", [&] { input_.assign(input); });
   read_line();
@@ -43,7 +43,7 @@ void InputLines::read_line() {
         if (error == asio::error::operation_aborted) return;
         if (error == asio::error::not_found) {
           const Problem problem{ErrorKind::data, "standard input",
-                                "a line is longer than 4096 bytes", "write shorter ones"};
+                                "a line is longer than 4096 bytes", "write shorter lines"};
           return on_end_(&problem);
         }
         if (error) size = buffer_.size();  // the last line may lack its end

@@ -173,19 +173,20 @@ double read_speed(const std::string& text) {
   std::int32_t hundredths = 0;
   if (parse_hundredths(Text(text), hundredths) && hundredths > 0) return hundredths / 100.0;
   throw Error(ErrorKind::usage, "--speed " + text, "is not a valid speed",
-              "write one such as 0.5 or 10");
+              "write a number such as 0.5 or 10");
 }
 
 constexpr const char* replay_footer =
-    R"(What a board of a recording said is said again, at its pace, on a transport where hosts find it: they
-see the states, heartbeats and answers of then, damaged ones too. A replayed board obeys nothing and
-answers nothing: a command is never confirmed, a stop stops nothing. Over UDP it speaks to whoever has
-spoken to it within two seconds, eight at most; on a pty and a CAN bus to all. Where its transport was
-lost then it says nothing for as long; the one that it has now stays open.
+    R"(Sends the recorded datagrams of a board again, at the recorded speed, on a transport where hosts
+find it. Hosts receive the recorded states, heartbeats and answers, including damaged datagrams. A
+replayed board does not obey commands or answer questions: commands are not confirmed, and a stop
+has no effect. Over UDP it sends to each program that sent to it in the last two seconds, eight
+programs at most; on a pty and a CAN bus it sends to all. If the recorded transport was down, it is
+silent for the same time; its present transport stays open.
 
-For a program on this machine replay:FILE is simpler: r4 monitor replay:drive.r4log
+For a program on this computer, replay:FILE is simpler: r4 monitor replay:drive.r4log
 
-With --step each line on standard input is one datagram more, which is shown.
+With --step, each line on standard input sends one datagram, and prints it.
 
 Examples:
   r4 replay drive.r4log                         at udp://127.0.0.1:2018
@@ -194,8 +195,8 @@ Examples:
   r4 replay robots.r4log 'can://vcan0?node=3' --path 2
   r4 replay drive.r4log --step                  press Return
 
-Exit codes: 0 the recording has ended, or --duration or Ctrl-C; 1 some of it could not be read, or it is not a
-recording; 2 usage; 4, 5 the file or the transport cannot be opened.)";
+Exit codes: 0 the recording has ended, or --duration or Ctrl-C; 1 some parts could not be read, or
+the file is not a recording; 2 usage; 4, 5 the file or the transport cannot be opened.)";
 
 }  // namespace
 
@@ -204,21 +205,21 @@ void add_replay(CLI::App& root, Action& chosen) {
   CLI::App* const command = add_subcommand(root, chosen, "replay", "Play a recording as a board",
                                            replay_footer, options, replay);
   add_text(*command, "FILE", options->file, "a recording", file_type, Need::required);
-  add_text(*command, "URL", options->url, "where it listens (default udp://127.0.0.1:2018)",
+  add_text(*command, "URL", options->url, "URL where it listens (default udp://127.0.0.1:2018)",
            url_type);
   add_number(*command, "--path", options->path, 1, 65535,
-             "which board of the recording: its number in r4 info (default 1)");
+             "number of the board in r4 info (default 1)");
   add_text(
       *command, "--speed",
       [options](const std::string& text) { options->speed = read_speed(text); },
-      "so many times as fast as it was (default 1)", "TIMES", Need::optional);
+      "speed relative to the recording (default 1)", "TIMES", Need::optional);
   add_text(
       *command, "--from",
       [options](const std::string& text) { options->start = ReplayStart::of("--from", text); },
-      "seconds that are passed over, or a time in UTC", "TIME", Need::optional);
+      "start of the replay: seconds to skip, or a time in UTC", "TIME", Need::optional);
   add_duration(*command, options->duration);
-  add_flag(*command, "--step", options->step, "a datagram for each line on standard input");
-  add_json(*command, options->json, "print where it listens as JSON");
+  add_flag(*command, "--step", options->step, "send one datagram for each line on standard input");
+  add_json(*command, options->json, "print its URL as JSON");
 }
 
 }  // namespace r4::tool

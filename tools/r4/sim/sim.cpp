@@ -90,8 +90,8 @@ std::vector<Plan> plans_of(const SimOptions& options) {
     std::vector<PatternUrl> urls = expand_urls(text);
     if (urls.front().number.empty()) continue;
     if (options.urls.size() > 1) {
-      throw Error(ErrorKind::usage, text, "several boards cannot share the other transports",
-                  "run them as a process of their own");
+      throw Error(ErrorKind::usage, text, "several boards cannot share a second transport",
+                  "start a separate r4 sim for each board");
     }
     std::vector<Plan> plans;
     plans.reserve(urls.size());
@@ -125,7 +125,7 @@ class ServedBoard {
       auto carrier = standard_registry().make(io, url, Role::board);
       for (const Carrier* const other : carriers_) {
         if (other->name() != carrier->name() || !url.starts_with("can:")) continue;
-        throw Error(ErrorKind::usage, url, "the board is there already", "name a node once");
+        throw Error(ErrorKind::usage, url, "this board exists already", "name a node once");
       }
       if (options.link) carrier = impaired(io, std::move(carrier), *options.link);
       carriers_.push_back(carrier.get());
@@ -183,7 +183,8 @@ class ServedBoard {
 
 int simulate(const SimOptions& options) {
   if (options.sensors && (!options.json || options.quiet)) {
-    throw Error(ErrorKind::usage, "--sensors", "is for JSON", "add --json, and leave out --quiet");
+    throw Error(ErrorKind::usage, "--sensors", "needs JSON output",
+                "add --json, and leave out --quiet");
   }
   asio::io_context io(1);
 
@@ -237,28 +238,36 @@ int simulate(const SimOptions& options) {
 }
 
 constexpr const char* sim_footer =
-    R"(The board streams its state and obeys commands as the real one does, with the inputs of the bench in
-the paper's capture. It prints where it listens and what it does; with --json one object a line:
+    R"(The simulated board streams its state and obeys commands like a real board. Its inputs have the
+values of the paper's capture. r4 sim prints its URLs and its events; with --json, one JSON
+object a line:
   {"type":"listening","url":…,"host_url":…}
   {"type":"event","t":…,"state":"CONNECTING|ACTIVE|SAFE","reason":…}   t: the board's clock, ms
-with "board" if there are several, "outputs" when a pin of a chip or a stepper does something else, with
-"supply", whether the motors have any (relay 1 closed, handle held: docs/reference/safety.md),
-"fault" when a chip is in trouble, "executed" or "refused" for a command, "rejected" (missing, unknown
-key, wrong tag, replayed, old) for what was not signed as a key asks, "transport" when one went down or
-came up, and "silence" (ms since the host was last heard) when the board goes safe for that.
-With --sensors, as often as that says
+An event may also have these keys:
+  "board"       the board, if there are several boards
+  "outputs"     the pins of the chips and the steppers, if they changed; with "supply", whether the
+                motors have supply (relay 1 closed, handle held: docs/reference/safety.md)
+  "fault"       a chip has a fault
+  "executed", "refused"   a command
+  "rejected"    a datagram that is not signed as the key requires: missing, unknown key, wrong tag,
+                replayed, old
+  "transport"   a transport went down or came up
+  "silence"     the ms since the last heartbeat, if the board goes safe because of the silence
+With --sensors, at that interval:
   {"type":"sensors","t":…,"supply":…,"handle":…,"enc":[…],"stepper":[…],"us":[…],"analog":{"AIN24":…,…}}
-At the end
+At the end:
   {"type":"counters","transport":…,"received":…,"sent":…,"dropped":…,…}   datagrams of a transport
 with "transfers" on CAN.
 
-With --link the datagrams of each direction suffer: of 100 so many are lost, doubled or damaged, each takes so
-long give or take, and nothing passes from 10 s after the start for 2 s. The same seed does the same; at the
-end {"type":"impairment","transport":…,"received":{"passed":…,"lost":…,…},"sent":{…}} tells what it did.
+--link adds faults to both directions of the link: loss, duplicate and corrupt are the percentage of
+lost, duplicated and damaged datagrams; delay=20ms±10 is the delay and its variation; cut=10s+2s
+blocks all datagrams for 2 s, 10 s after the start. The same seed gives the same faults. At the end
+{"type":"impairment","transport":…,"received":{"passed":…,"lost":…,…},"sent":{…}} reports the
+counts.
 
 A scenario (--script) has lines such as: 0.5 handle released / 1 us 1 15 / 2 chip dac off / 3 reboot
-With --stdin the same words without the time make it happen at once: handle released. What happens is an
-event with "happened"; {"type":"error",…} is a line that was not understood.
+With --stdin, a line without the time happens at once, such as: handle released. Each step is an
+event with "happened"; {"type":"error",…} reports a line that is not valid.
 
 Examples:
   r4 sim                                       at udp://127.0.0.1:2018
@@ -266,12 +275,12 @@ Examples:
   r4 sim --link loss=5%,delay=20ms±10          over a bad WiFi
   r4 sim --stdin                               and type: us 1 15
   r4 sim --device bno055                       with a BNO055 on the user's I2C bus
-  r4 sim --wiring robot.wiring                 a board that is wired like that file
+  r4 sim --wiring robot.wiring                 a board with the wiring of this file
   r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
                                                r4 monitor serial:///tmp/r4
   r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
   r4 sim 'can://vcan0?node=0-7'                eight boards on one CAN bus
-  r4 sim udp://127.0.0.1:20000-20099           a hundred boards at a port each
+  r4 sim udp://127.0.0.1:20000-20099           a hundred boards, each with its own port
 
 Exit codes: 0 ended by --duration or a signal; 1 the script is wrong; 2 usage; 4, 5 the port or
 device cannot be opened.)";
@@ -284,36 +293,35 @@ void add_sim(CLI::App& root, Action& chosen) {
   CLI::App* const command =
       add_subcommand(root, chosen, "sim", "Run a simulated board", sim_footer, options, simulate);
   add_texts(*command, "URL", options->urls,
-            "where it listens, up to four (default udp://127.0.0.1:2018)", url_type);
+            "URLs where it listens, up to four (default udp://127.0.0.1:2018)", url_type);
   add_json(*command, options->json, "print events as JSON, one object a line");
-  add_flag(*command, "--quiet", options->quiet, "print only where it listens");
+  add_flag(*command, "--quiet", options->quiet, "print only its URLs");
   add_duration(*command, options->duration);
   add_seconds(*command, "--sensors", options->sensors,
-              "with --json: what the sensors sense, as often as that");
-  add_text(*command, "--script", options->script, "a scenario: what happens around the board",
-           file_type);
-  add_flag(*command, "--stdin", options->input,
-           "read from standard input what happens around the board");
+              "with --json: print the sensor values at this interval");
+  add_text(*command, "--script", options->script, "a scenario: events around the board", file_type);
+  add_flag(*command, "--stdin", options->input, "read events around the board from standard input");
   add_number(*command, "--seed", options->seed, 0, ~std::uint64_t{0},
              "the same seed gives the same clock, inputs and nonces (with a key: for tests)");
   add_repeated(*command, "--set", options->settings,
-               "a setting as C:KEY,VALUE makes it, such as rate,50 (can be given again)",
-               "KEY,VALUE");
+               "a setting, as by C:KEY,VALUE, such as rate,50; may be repeated", "KEY,VALUE");
   add_repeated(*command, "--device", options->devices,
-               "icm20948, bno055, vl53l0x or as5600, on the user's I2C bus (can be given again)",
+               "icm20948, bno055, vl53l0x or as5600 on the user's I2C bus; may be repeated",
                "NAME");
   add_text(*command, "--wiring", options->wiring,
-           "how the board is wired, as r4 wiring template writes it (default: the plan)",
+           "wiring file of the firmware, as from r4 wiring template (default: the plan)",
            file_type);
   add_text(*command, "--wired", options->wired,
-           "how it is wired in truth; its firmware believes --wiring", file_type);
-  add_flag(*command, "--new", options->as_new, "as from the box: nobody has confirmed the plan");
+           "real wiring, if it differs from the wiring that the firmware uses (--wiring)",
+           file_type);
+  add_flag(*command, "--new", options->as_new, "a new board, whose wiring is not confirmed");
   add_text(
       *command, "--link",
       [options](const std::string& text) { options->link = Impairment::parse(text); },
-      "a bad one: loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7", "HOW",
+      "link faults: loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7", "HOW",
       Need::optional);
-  add_text(*command, "--board-id", options->board_id, "its answer to Q:ID (default sim-1)", "ID");
+  add_text(*command, "--board-id", options->board_id,
+           "the board id in the answer to Q:ID (default sim-1)", "ID");
 }
 
 }  // namespace r4::tool

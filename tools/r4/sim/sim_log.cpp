@@ -34,7 +34,7 @@ int number_of(Direction direction) { return static_cast<int>(direction); }
 
 std::string missing_lines(bool json, std::uint64_t count) {
   if (json) return line_of({{"type", "lost"}, {"lines", count}});
-  return fmt::format("({} lines are missing: whoever reads this was too slow)\n", count);
+  return fmt::format("({} lines are missing: the reader of this output was too slow)\n", count);
 }
 
 }  // namespace
@@ -226,7 +226,7 @@ void SimLog::on_impairment(const ImpairedCarrier& link) {
     return print(object);
   }
   for (const auto& [way, counters] : {std::pair("in", link.received()), {"out", link.sent()}}) {
-    output_.print(fmt::format("{}: {} passed {}, {} lost, {} doubled, {} damaged, {} cut\n",
+    output_.print(fmt::format("{}: {} passed {}, {} lost, {} duplicated, {} damaged, {} cut\n",
                               link.name(), counters.passed, way, counters.lost, counters.duplicated,
                               counters.corrupted, counters.cut));
   }
@@ -243,7 +243,7 @@ void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason
   }
   std::string text = to_text(state);
   if (reason != SafeReason::none) text += fmt::format(" ({})", to_text(reason));
-  if (silent) text += fmt::format(", the host was last heard {} ms ago", silence_ms);
+  if (silent) text += fmt::format(", the last heartbeat of the host was {} ms ago", silence_ms);
   print(t_ms, text);
 }
 

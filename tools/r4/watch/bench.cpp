@@ -220,11 +220,10 @@ class Bench {
         transfers.wrong_sequence, transfers.timed_out, transfers.overflow, transfers.interrupted,
         transfers.cancelled);
     print_text(
-        "  frames passed over    {:>9}       {} unexpected, {} malformed; dropped unread "
-        "{}\n",
+        "  frames ignored        {:>9}       {} unexpected, {} malformed; dropped unread {}\n",
         transfers.unexpected + transfers.malformed, transfers.unexpected, transfers.malformed,
         counters.rx_overflows);
-    print_text("  packed datagrams      {:>9}       {} of bad form\n", transfers.packed,
+    print_text("  packed datagrams      {:>9}       {} malformed\n", transfers.packed,
                transfers.bad_form);
   }
 
@@ -249,15 +248,16 @@ class Bench {
 int bench(const BenchOptions& options) { return Bench(options).run(); }
 
 constexpr const char* bench_footer =
-    R"(Round trips are questions (Q:ID) answered by the board, one at a time. A command is confirmed by the
-board's state, so at 100 Hz that takes up to 10 ms; the command is one that changes nothing.
+    R"(A round trip is the time from a question (Q:ID) to its answer; questions are sent one at a time. A
+command is confirmed by the board's state, so at 100 Hz this takes up to 10 ms. The command does not
+change anything.
 
 Examples:
   r4 bench serial:auto
   r4 bench udp://127.0.0.1 --duration 10 --json
 
-Exit codes: 0 done; 3 no board answers, or another host has it; 2 usage; 4, 5 the transport cannot be
-opened.)";
+Exit codes: 0 done; 3 no board answers, or another host controls the board; 2 usage; 4, 5 the
+transport cannot be opened.)";
 
 }  // namespace
 
@@ -266,7 +266,7 @@ void add_bench(CLI::App& root, Action& chosen) {
   CLI::App* const command = add_subcommand(root, chosen, "bench", "Measure the link to a board",
                                            bench_footer, options, bench);
   add_paths(*command, options->urls);
-  add_duration(*command, options->duration, "how long to measure (default 5)");
+  add_duration(*command, options->duration, "duration of the measurement (default 5)");
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON");
 }

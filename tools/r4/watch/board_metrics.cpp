@@ -30,23 +30,23 @@ void describe_paths(const SetBoard& each, const MetricLabels& one, MetricFamilie
   for (std::size_t i = 0; i < paths.size(); ++i) {
     const PathStatus& path = paths[i];
     const MetricLabels labels = with(one, "path", urls[i]);
-    out.gauge("r4_path_carrying", "Of several paths to the board, does this one carry?", labels,
+    out.gauge("r4_path_carrying", "1 if this path to the board carries datagrams, else 0.", labels,
               path.state == PathState::carrying ? 1 : 0);
-    out.count("r4_path_received_total", "Datagrams of the board by this path.", labels,
+    out.count("r4_path_received_total", "Datagrams of the board on this path.", labels,
               path.packets.received);
-    out.count("r4_path_lost_total", "Those that it did not bring in their turn.", labels,
-              lost_in_turn(path.packets));
-    out.count("r4_path_late_total", "Those of them that it brought later.", labels,
+    out.count("r4_path_lost_total", "Datagrams of the board that this path did not bring in order.",
+              labels, lost_in_turn(path.packets));
+    out.count("r4_path_late_total", "Missing datagrams that this path brought later.", labels,
               path.packets.late);
-    out.count("r4_path_copies_total", "Those that another path had brought before.", labels,
-              path.copies);
+    out.count("r4_path_copies_total", "Datagrams that another path brought before this path.",
+              labels, path.copies);
     if (path.round_trip_us > 0) {
       out.gauge("r4_path_round_trip_seconds",
-                "From the newest question on this path to its answer.", labels,
+                "Time from the newest question on this path to its answer.", labels,
                 path.round_trip_us / 1e6);
     }
     if (path.age_us > 0) {
-      out.gauge("r4_path_age_seconds", "Since the newest datagram by this path.", labels,
+      out.gauge("r4_path_age_seconds", "Time since the newest datagram on this path.", labels,
                 path.age_us / 1e6);
     }
   }
@@ -92,7 +92,7 @@ void describe(const SetBoard& each, MetricFamilies& out) {
   const bool up = link.state == HostLinkState::active || link.state == HostLinkState::safe;
   const MetricLabels one{{"url", each.url}};
 
-  out.gauge("r4_up", "The board is heard.", one, up ? 1 : 0);
+  out.gauge("r4_up", "1 if datagrams of the board arrive, else 0.", one, up ? 1 : 0);
   if (!who.board_id.empty()) {
     MetricLabels info = with(with(one, "board", who.name), "hardware_id", who.board_id);
     out.gauge("r4_info", "The board's identity; always 1.",
@@ -100,37 +100,36 @@ void describe(const SetBoard& each, MetricFamilies& out) {
   }
   for (int i = 0; up && i < safe_reason_count; ++i) {
     const auto reason = static_cast<SafeReason>(i);
-    out.gauge("r4_safe", "Why the outputs are off: 1 for the reason that holds, none included.",
+    out.gauge("r4_safe", "Why the outputs are off: 1 for the present reason, which may be none.",
               with(one, "reason", to_text(reason)), link.reason == reason ? 1 : 0);
   }
   out.count("r4_received_total", "Datagrams of the board.", one, statistics.received);
-  out.count("r4_states_total", "Those of them that are states.", one, statistics.states);
+  out.count("r4_states_total", "States of the board.", one, statistics.states);
   out.count("r4_damaged_total", "Received data that were not a valid datagram.", one,
             statistics.damaged);
-  out.count("r4_lost_total", "Datagrams of the board that did not come in their turn.", one,
+  out.count("r4_lost_total", "Datagrams of the board that did not arrive in order.", one,
             lost_in_turn(statistics.packets));
-  out.count("r4_duplicates_total", "Datagrams that came again.", one, statistics.packets.duplicate);
-  out.count("r4_late_total", "Lost datagrams that came later.", one, statistics.packets.late);
-  out.count("r4_restarts_total", "Times the board began again.", one, statistics.packets.restarts);
+  out.count("r4_duplicates_total", "Duplicate datagrams.", one, statistics.packets.duplicate);
+  out.count("r4_late_total", "Missing datagrams that arrived later.", one, statistics.packets.late);
+  out.count("r4_restarts_total", "Restarts of the board.", one, statistics.packets.restarts);
   out.count("r4_transport_bytes_total", "Bytes of datagrams.", with(one, "direction", "received"),
             carrier.rx_bytes);
   out.count("r4_transport_bytes_total", "", with(one, "direction", "sent"), carrier.tx_bytes);
-  out.count("r4_transport_downs_total", "Times the transport was lost.", one, carrier.downs);
+  out.count("r4_transport_downs_total", "Disconnections of the transport.", one, carrier.downs);
   describe_paths(each, one, out);
   if (!up) return;
-  out.gauge("r4_state_rate_hertz", "States a second, over the last.", one,
-            statistics.state_rate_hz);
+  out.gauge("r4_state_rate_hertz", "States in the last second.", one, statistics.state_rate_hz);
   if (statistics.round_trip_us > 0) {
-    out.gauge("r4_round_trip_seconds", "From the newest question to its answer.", one,
+    out.gauge("r4_round_trip_seconds", "Time from the newest question to its answer.", one,
               statistics.round_trip_us / 1e6);
   }
   if (!state.any()) return;
-  out.gauge("r4_state_age_seconds", "Since the newest state came.", one,
+  out.gauge("r4_state_age_seconds", "Time since the newest state.", one,
             statistics.state_age_us / 1e6);
   out.gauge("r4_jitter_seconds", "Interarrival jitter of the states (RFC 3550).", one,
             statistics.jitter_us / 1e6);
   if (state.sampled_error != ReceivedState::unknown) {
-    out.gauge("r4_clock_error_seconds", "How well the time of a sample is known.", one,
+    out.gauge("r4_clock_error_seconds", "Uncertainty of the time of a sample.", one,
               std::chrono::duration<double>(state.sampled_error).count());
   }
   for (const StateField field : state.present) {

@@ -54,9 +54,9 @@ class Input {
  private:
   [[noreturn]] void fail() const {
     const bool denied = errno == EACCES || errno == EPERM;
-    throw Error(
-        denied ? ErrorKind::permission : ErrorKind::open, name_, std::strerror(errno),
-        denied ? "allow reading it: chmod +r" : "give a readable file, or - for standard input");
+    throw Error(denied ? ErrorKind::permission : ErrorKind::open, name_, std::strerror(errno),
+                denied ? "allow reading of the file: chmod +r"
+                       : "give a readable file, or - for standard input");
   }
 
   std::string name_;
@@ -154,29 +154,30 @@ int decode(const DecodeOptions& options) {
 }
 
 constexpr const char* decode_footer = R"(One JSON object for each line of input that is not empty:
-  line, ok      the line's number from 1; is it a valid datagram
+  line, ok      the number of the line, from 1; whether it is a valid datagram
   type          state, heartbeat, command, nack or identity
-  pnum, t       packet number and time, null where it has none
+  pnum, t       packet number and time, or null if missing
   fields        the other fields: numbers as numbers, several values as an array
-  error         length, syntax or crc, with the position of the byte where it went wrong
-  expected, found   for crc: the checksum of the bytes, and the one that they claim
-  packed        of a line packed:HEX (r4 encode --packed, docs/reference/packed.md): its size in bytes;
-                the rest is about the datagram that it holds
-  error packed  it holds none; reason: hex (not pairs of hexadecimal digits), length, version
-                (of a later one: update r4) or syntax
+  error         length, syntax or crc, with the position of the wrong byte
+  expected, found   for crc: the checksum of the bytes, and the checksum in the datagram
+  packed        for a line packed:HEX (r4 encode --packed, docs/reference/packed.md): its size in
+                bytes; the other keys describe the datagram in it
+  error packed  it does not hold a datagram; reason: hex (not pairs of hexadecimal digits), length,
+                version (a later version: update r4) or syntax
   text          the datagram; bytes that are not printable ASCII, and \, as \xNN
 
---candump reads what candump prints, candump -L best, and joins the frames of every interface and
-node to datagrams. Before those keys, and with the line and time of the last frame:
-  time          as in the dump: seconds, or a date as text; null where it has none
+--candump reads the output of candump, preferably candump -L, and joins the frames of each interface
+and node to datagrams. The keys above follow these keys, and line and time are those of the last
+frame:
+  time          as in the dump: seconds, or a date as text; null if missing
   interface, node, from, lane   from host: command; from board: reply, telemetry
-  frames, took_ms   how many it took, and how long from the first to the last
+  frames, took_ms   the number of frames, and the time from the first to the last
   type          also emergency_stop, and went_safe with its reason
-  error isotp   a transfer that failed, and why: a receiver on the bus lost it, too
-  error candump a line that is none of candump's: reason and fix
-The last object is the summary. It counts what is not printed: flow control, orphans (frames
-without the beginning of their transfer), unfinished transfers, frames that are none of ours (other),
-error frames of the controller.
+  error isotp   a transfer that failed, and why: a receiver on the bus also lost it
+  error candump a line that candump did not write: reason and fix
+The last object is the summary. It counts what is not printed: flow control, orphans (frames without
+the first frame of their transfer), unfinished transfers, frames of another protocol (other), error
+frames of the controller.
 
 Examples:
   r4 encode O:358,1,1 | r4 decode
@@ -185,8 +186,8 @@ Examples:
   candump -L can0 | r4 decode --candump
   r4 decode --candump bus.log | jq -c 'select(.node == 3 and .lane == "command")'
 
-Exit codes: 0 every datagram is valid; 1 at least one is not, or with --candump a transfer failed or
-a line is damaged; 4, 5 the file cannot be read.)";
+Exit codes: 0 every datagram is valid; 1 a datagram is not valid, or with --candump a transfer
+failed or a line is damaged; 4, 5 the file cannot be read.)";
 
 }  // namespace
 
@@ -197,7 +198,7 @@ void add_decode(CLI::App& root, Action& chosen) {
                      options, decode);
   add_text(*command, "FILE", options->file, "datagrams, one a line (default: standard input)",
            file_type);
-  add_flag(*command, "--candump", options->candump, "the file is what candump printed");
+  add_flag(*command, "--candump", options->candump, "the input is the output of candump");
 }
 
 }  // namespace r4::tool

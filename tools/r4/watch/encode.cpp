@@ -119,7 +119,7 @@ int encode(const EncodeOptions& options) {
   Datagram datagram;
   if (bytes.empty() || !read_datagram(bytes, datagram)) {
     fail("the datagram", fmt::format("is longer than {} bytes", max_datagram),
-         "put fewer fields into it");
+         "write fewer fields");
   }
   if (!options.force) check(datagram);
   std::array<std::uint8_t, max_datagram> packed;
@@ -143,8 +143,8 @@ constexpr const char* encode_footer = R"(Examples:
   r4 encode O:358,1,1 --pnum 66 --time 1699276044383 --packed
                               packed:8d004218ba4beb85f3b358c1c1df7fefae81
 
---packed is the form for a CAN bus (docs/reference/packed.md), in hexadecimal; a datagram that would not
-get shorter is printed plain, as it would travel. r4 decode reads both.
+--packed is the form for a CAN bus (docs/reference/packed.md), in hexadecimal. If the packed form is
+not shorter, the datagram is printed as text, as it would be sent. r4 decode reads both forms.
 
 Commands of the board (r4 send --help) are checked before they are encoded.
 

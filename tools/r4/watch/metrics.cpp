@@ -56,10 +56,9 @@ class BusMetrics {
       busy_ns[of_a_board ? std::to_string(meaning.node) : "other"] += traffic.busy_ns;
     }
     for (const auto& [node, ns] : busy_ns) {
-      out.counter(
-          "r4_can_busy_seconds_total",
-          "For how long frames to and from a node took the bus; its rate is the load, 0 to 1.",
-          {{"interface", name_}, {"node", node}}, static_cast<double>(ns) / 1e9);
+      out.counter("r4_can_busy_seconds_total",
+                  "Time for which frames of a node occupied the bus; its rate is the load, 0 to 1.",
+                  {{"interface", name_}, {"node", node}}, static_cast<double>(ns) / 1e9);
     }
   }
 
@@ -125,11 +124,12 @@ class MetricsCommand final : web::ServerEvents {
 int serve_metrics(const MetricsOptions& options) { return MetricsCommand(options).run(options); }
 
 constexpr const char* metrics_footer =
-    R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/how-to/metrics.md). For each board: whether it is
-heard, why its outputs are off, rate, loss, round trip, age and jitter of its states, analog inputs. For each
-CAN interface: its load, and by which boards. It watches, as r4 monitor does, and takes no control.
---listen 0.0.0.0:9618 also answers other computers, which can only read. Requests must name the address;
---host adds a name of this computer, or of a proxy in front of it.
+    R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/how-to/metrics.md). For each board:
+whether its datagrams arrive, why its outputs are off, rate, loss, round trip, age and jitter of its
+states, analog inputs. For each CAN interface: the load by each board. r4 metrics only watches, as
+r4 monitor does, and does not take control. With --listen 0.0.0.0:9618 it also answers other
+computers, which can only read. Requests must name the address; --host adds a name of this computer,
+or of a proxy.
 
 Examples:
   r4 metrics udp://192.168.0.125
@@ -148,14 +148,13 @@ void add_metrics(CLI::App& root, Action& chosen) {
       add_subcommand(root, chosen, "metrics", "Serve metrics of boards to Prometheus",
                      metrics_footer, options, serve_metrics);
   add_boards(*command, options->urls);
-  add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:9618)",
-           "ADDRESS:PORT");
+  add_text(*command, "--listen", options->listen,
+           "address for HTTP requests (default 127.0.0.1:9618)", "ADDRESS:PORT");
   add_repeated(*command, "--host", options->hosts,
-               "a name by which it is asked, too: of this computer, or of a proxy in front",
-               "NAME");
+               "another name for requests: of this computer, or of a proxy", "NAME");
   add_duration(*command, options->duration);
   add_key(*command, options->key);
-  add_json(*command, options->json, "print where it listens as JSON");
+  add_json(*command, options->json, "print its URL as JSON");
 }
 
 }  // namespace r4::tool

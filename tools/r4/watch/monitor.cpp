@@ -68,7 +68,8 @@ class Monitor {
         table_tick_(boards_.io()),
         patience_(boards_.io()) {
     if (boards_.size() > 1 && !devices_.empty()) {
-      throw Error(ErrorKind::usage, "--device", "is for one board", "name one");
+      throw Error(ErrorKind::usage, "--device", "is possible only with one board",
+                  "give the URL of one board");
     }
     const bool live = ::isatty(STDOUT_FILENO) != 0;
     if (boards_.size() > 1 && !options.json) table_.emplace(boards_, live, *lines_);
@@ -206,48 +207,51 @@ int monitor(const MonitorOptions& options) {
   if (bus.empty()) return Monitor(options).run();
   if (!options.fields.empty() || !options.devices.empty()) {
     throw Error(ErrorKind::usage, options.fields.empty() ? "--device" : "--fields",
-                "only one board can be asked for its fields",
-                "name the board: can://" + bus + "?node=1");
+                "is possible only with one board, not a whole bus",
+                "give the board's URL: can://" + bus + "?node=1");
   }
   monitor_bus({bus, options.json, options.count, options.duration});
   return 0;
 }
 
 constexpr const char* monitor_footer =
-    R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
-line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
-numbers, several values as an array); of a board on a CAN bus, at the end, one of type transfers.
-The causes of a link say what is wrong with it, the gravest first: transport down, two boards,
-watchdog, callback, foreign frames, busy (another host controls the board), board has no key,
-key needed, key not taken, watchers full, not watchable, late frames, other board.
+    R"(On a terminal: a status, redrawn in place. Into a pipe: one line for each state. With --json: one
+object a line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields
+(numbers as numbers, several values as an array). For a board on a CAN bus, the last object has type
+transfers. The causes of a link report its faults, the gravest first: transport down, two boards,
+watchdog, callback, foreign frames, busy (another host controls the board), board has no key, key
+needed, key not taken, watchers full, not watchable, late frames, other board.
 
-The monitor watches: it sends no heartbeats and takes no control, and a board that no host controls
-streams to it all the same. With --control it takes part in the link, as a host that commands nothing:
-the board is ACTIVE. It goes on when the transport is lost and comes back. On a CAN bus a board that
-no host controls streams five times a second; without a node it only listens, and shows every board that it
-hears. Of several boards, by URLs or a pattern, it is a table, or the JSON of each.
+The monitor only watches: it does not send heartbeats or take control. A board that no host controls
+still streams its state to the monitor. With --control the monitor takes control and does not
+command outputs, so the board is ACTIVE. The monitor continues when the transport disconnects and
+reconnects. On a CAN bus, a board that no host controls streams five times a second. A CAN URL
+without a node only listens, and shows every board on the bus. For several boards, by URLs or a
+pattern, the monitor shows a table, or the JSON of each board.
 
-Where + joins several paths to a board, it has a line for each of them, and one when a path begins to carry or
-ceases to; in JSON of type path, also at the end.
+For a board with several paths, joined by +, the monitor shows a line for each path, and reports
+when a path begins or ceases to carry datagrams. In JSON these objects have type path, also at the
+end.
 
-With --device it shows what a sensor on the user's I2C bus measures, with units; in JSON a line of type
-reading, whose t is when the board read it. r4 devices lists what is described; NAME may be the path of a
-file of your own, and :SLOT behind the address is the first slot that it takes. Where no host controls the
-board, it takes control and sets the device up, which may write to it; where one does, it shows the slots
-as that host has set them up.
+With --device the monitor shows the measured values of a sensor on the user's I2C bus, with units.
+In JSON these objects have type reading, and t is the time of the reading. r4 devices lists the
+described devices. NAME may be the path of your own file, and :SLOT after the address is the first
+slot to use. If no host controls the board, the monitor takes control and sets the device up, which
+may write to the device. If a host controls the board, the monitor shows the slots as that host has
+set them up.
 
 Examples:
   r4 monitor udp://192.168.0.125
   r4 monitor serial:auto --fields DEFAULT,ENC1,US1
   r4 monitor serial:auto+udp://192.168.0.125    one board by two paths
-  r4 monitor 'udp:?id=left-arm'         the board of that name, wherever it is; r4 list shows them
+  r4 monitor 'udp:?id=left-arm'         the board with this name; r4 list shows the names
   r4 monitor serial:auto --device bno055@0x28 --device ina219@0x40
-  r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one
+  r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one board
   r4 monitor 'udp://10.0.0.{1-30}?listen=0'   thirty boards
   r4 monitor udp://127.0.0.1 --json --count 100 | jq .fields.AIN24
 
-Exit codes: 0 ended by --count, --duration or Ctrl-C; 3 nothing was heard; 2 usage; 4 the transport
-cannot be opened; 5 permission denied.)";
+Exit codes: 0 ended by --count, --duration or Ctrl-C; 3 nothing was received; 2 usage; 4 the
+transport cannot be opened; 5 permission denied.)";
 
 }  // namespace
 
@@ -258,11 +262,11 @@ void add_monitor(CLI::App& root, Action& chosen) {
   add_boards(*command, options->urls);
   add_json(*command, options->json, "print JSON, one object a line");
   add_number(*command, "--count", options->count, 1, ~std::uint64_t{0},
-             "end after that many states (or 5 s in which nothing at all is heard)");
+             "end after this number of states (or after 5 s without any datagram)");
   add_duration(*command, options->duration);
   add_fields(*command, options->fields);
   add_repeated(*command, "--device", options->devices,
-               "a described one on the user's I2C bus, such as bno055@0x28: shows what it measures",
+               "show the values of a described device on the I2C bus, such as bno055@0x28",
                "NAME@ADDRESS");
   add_flag(*command, "--control", options->control,
            "take control: send heartbeats, so that the board is ACTIVE");

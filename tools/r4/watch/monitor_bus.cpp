@@ -53,8 +53,9 @@ class BusMonitor {
     tick_.every(live_ ? bus_tick : plain_interval, [this] { show(); });
     io_.run();
     if (!any_heard()) {
-      throw Error(ErrorKind::refused, name(), "no board was heard",
-                  "see that boards are connected and have this bus's bit rate; r4 list shows it");
+      throw Error(
+          ErrorKind::refused, name(), "no board was found on the bus",
+          "check that boards are connected and have the bit rate of this bus, which r4 list shows");
     }
     show();
   }

@@ -117,8 +117,8 @@ void Foxglove::subscribe(ClientId client, Subscriptions& mine, SubscriptionId id
   const auto found = std::find_if(channels_.begin(), channels_.end(),
                                   [channel](const Channel& each) { return each.id == channel; });
   const char* why = nullptr;
-  if (found == channels_.end()) why = "there is no such channel";
-  if (mine.contains(id)) why = "that subscription is there already";
+  if (found == channels_.end()) why = "the channel does not exist";
+  if (mine.contains(id)) why = "this subscription exists already";
   if (mine.size() == channels_.size()) why = "too many subscriptions";
   if (why != nullptr) {
     tell(client, text_of({{"op", "status"}, {"level", 2}, {"message", why}}));

@@ -34,12 +34,13 @@ std::int64_t wall_ms() { return wall_time<std::chrono::milliseconds>().count(); 
 void require_allowed(const Command& command) {
   switch (command.kind) {
     case CommandKind::setting:
-      throw Error(ErrorKind::usage, shown(command), "settings are not taken from a page",
-                  "r4 send URL " + shown(command) + " sets it");
+      throw Error(ErrorKind::usage, shown(command), "a page cannot change settings",
+                  "use r4 send URL " + shown(command));
     case CommandKind::heartbeat:
     case CommandKind::leave:
     case CommandKind::watch:
-      throw Error(ErrorKind::usage, shown(command), "is said by r4 web itself", "leave it out");
+      throw Error(ErrorKind::usage, shown(command), "is sent by r4 web itself",
+                  "leave this command out");
     default:
       break;
   }
@@ -99,7 +100,7 @@ void Hub::on_open(ClientId client, Protocol protocol) {
 void Hub::on_message(ClientId client, Protocol protocol, std::string text) {
   if (protocol == Protocol::foxglove) {
     if (!foxglove_.on_message(client, text)) {
-      return server_.drop(client, "the message is not one of foxglove.websocket.v1");
+      return server_.drop(client, "the message is not valid in foxglove.websocket.v1");
     }
     return server_.read_on(client);
   }
@@ -107,9 +108,9 @@ void Hub::on_message(ClientId client, Protocol protocol, std::string text) {
   if (!request) {
     server_.send(
         client,
-        {std::make_shared<const std::string>(error_text("the message is not one of r4.web.v1")), "",
-         Outgoing::Kind::other});
-    return server_.drop(client, "the message is not one of r4.web.v1");
+        {std::make_shared<const std::string>(error_text("the message is not valid in r4.web.v1")),
+         "", Outgoing::Kind::other});
+    return server_.drop(client, "the message is not valid in r4.web.v1");
   }
   asio::post(io_, [this, client, request = std::move(*request)] {
     obey(client, request);
@@ -172,7 +173,7 @@ void Hub::greet(ClientId client) {
 
 void Hub::leave(ClientId client) {
   pages_.erase(client);
-  if (control_.release(client)) end_control("the browser that had control has gone");
+  if (control_.release(client)) end_control("the browser in control has disconnected");
 }
 
 void Hub::obey(ClientId client, const PageRequest& request) {
@@ -198,13 +199,14 @@ void Hub::obey(ClientId client, const PageRequest& request) {
 
 void Hub::want_control(ClientId client, bool wanted) {
   if (!wanted) {
-    if (control_.release(client)) end_control("it was given back");
+    if (control_.release(client)) end_control("control was given back");
     return;
   }
   if (control_.is_held_by(client)) return;
   if (!control_.take(client, now())) {
-    return tell_control(client, control_.leaving() ? "the boards are being left; ask again"
-                                                   : "another browser has control");
+    return tell_control(client, control_.leaving()
+                                    ? "the earlier control is still ending; ask again"
+                                    : "another browser has control");
   }
   for (const auto& board : boards_) {
     try {
@@ -229,7 +231,7 @@ void Hub::watch_holder() {
 void Hub::look_at_holder() {
   if (!control_.expired(now())) return;
   control_.release(*control_.holder());
-  end_control(fmt::format("nothing was heard of the browser for {} ms", Control::limit.count()));
+  end_control(fmt::format("the browser in control was silent for {} ms", Control::limit.count()));
 }
 
 void Hub::end_control(const std::string& why) {
@@ -258,7 +260,7 @@ void Hub::tell_control(ClientId client, const std::string& why) {
 // The controlling browser may start and end any recording. A browser may always end its own.
 void Hub::record(ClientId client, bool on) {
   if (!control_.is_held_by(client) && (on || !recording_.is_of(client))) {
-    return tell_recording(client, "this browser has no control; take it first");
+    return tell_recording(client, "this browser is not in control; take control first");
   }
   if (on) return recording_.begin(client);
   recording_.end();
@@ -291,10 +293,11 @@ void Hub::stop(ClientId client, const PageRequest& request) {
 void Hub::command(ClientId client, const PageRequest& request) {
   const std::size_t number = request.board;
   if (number >= boards_.size())
-    return answer(client, request, number, false, 0, "there is no such board");
+    return answer(client, request, number, false, 0, "the board does not exist");
   AsyncBoard& board = boards_[number]->board();
   if (!control_.is_held_by(client)) {
-    return answer(client, request, number, false, 0, "this browser has no control; take it first");
+    return answer(client, request, number, false, 0,
+                  "this browser is not in control; take control first");
   }
   try {
     if (request.kind == PageRequest::Kind::arm) {

@@ -92,7 +92,9 @@ std::string board_text(std::size_t number, WebBoard& slot) {
   object["link"] = link.causes.has(LinkCause::transport_down) ? "down" : to_text(link.state);
   object["causes"] = causes_json(link.causes);
   const bool free = !slot.controlling() && heard && link.reason == SafeReason::link;
-  object["why"] = fine ? "" : free ? "nobody controls it" : explain(slot.url(), link).reason;
+  object["why"] = fine   ? ""
+                  : free ? "no host controls the board"
+                         : explain(slot.url(), link).reason;
   object["controlled"] = link.in_control;
   object["armed"] = slot.controlling() && board.disarmed_by() == DisarmCause::none;
   object["disarmed"] = slot.controlling() ? to_text(board.disarmed_by()) : "";

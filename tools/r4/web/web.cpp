@@ -74,18 +74,21 @@ int serve_web(const Options& options) {
 }
 
 constexpr const char* footer =
-    R"(Shows boards in a browser, at the address that it prints: every value, live and as plots, how the links are,
-what happens. It watches, as r4 monitor does, until a browser takes control; then the boards are driven from
-there, by one browser at a time. If that one is closed, hidden, or silent for half a second, the boards are
-safe at once. Anybody who sees the page may stop them.
+    R"(Shows boards in a browser, at the address that it prints: every value, live and in plots, the links
+and the events. r4 web only watches, as r4 monitor does, until a browser takes control. Then that
+browser drives the boards; only one browser has control. If that browser is closed, hidden, or
+silent for half a second, the boards go safe at once. Every browser that shows the page may stop the
+boards.
 
-It answers at this computer alone, to all its users; with --token to who has the address that it prints.
---listen 0.0.0.0:8080 answers other computers, and to them always so. Nothing is encrypted: over a network
-that is not yours, use ssh -L, or a proxy in front, whose name --host tells (docs/how-to/web.md).
-With --device it shows what a sensor on the user's I2C bus measures (r4 devices); who takes control sets
-it up, once the board is armed.
+r4 web answers only this computer, and all its users; with --token, requests need the token in the
+printed address. With --listen 0.0.0.0:8080 it also answers other computers, and then always needs
+the token. The connection is not encrypted: over a network that is not yours, use ssh -L, or a proxy
+whose name is given by --host (docs/how-to/web.md). With --device the page shows the measured values
+of a sensor on the user's I2C bus (r4 devices). The controlling browser sets the sensor up after
+arming.
 
-Programs get the same by ws://ADDRESS/ with the Foxglove protocol, read-only, and Prometheus at /metrics.
+Programs get the same data at ws://ADDRESS/ with the Foxglove protocol, read-only, and Prometheus at
+/metrics.
 
 Examples:
   r4 web udp://192.168.0.125
@@ -93,8 +96,8 @@ Examples:
   r4 web serial:auto --listen 0.0.0.0:8080
   r4 web serial:auto --host robot.example       behind a proxy with TLS
 
-Exit codes: 0 ended by --duration or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5 permission
-denied.)";
+Exit codes: 0 ended by --duration or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5
+permission denied.)";
 
 }  // namespace
 
@@ -103,23 +106,22 @@ void add_web(CLI::App& root, Action& chosen) {
   CLI::App* const command = add_subcommand(
       root, chosen, "web", "Show and drive boards in a browser", footer, options, serve_web);
   add_boards(*command, options->urls);
-  add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:8080)",
+  add_text(*command, "--listen", options->listen, "address of the page (default 127.0.0.1:8080)",
            "ADDRESS:PORT");
   add_flag(*command, "--token", options->token,
-           "only who has the address that is printed; always so for other computers");
+           "require the token of the printed address; other computers always need it");
   add_repeated(*command, "--host", options->hosts,
-               "a name by which it is asked, too: of this computer, or of a proxy in front",
-               "NAME");
+               "another name for requests: of this computer, or of a proxy", "NAME");
   add_repeated(*command, "--origin", options->origins,
-               "of a foreign page that may read by the Foxglove protocol", "URL");
+               "origin of another site's page that may read with the Foxglove protocol", "URL");
   add_text(*command, "--record-to", options->record_folder,
-           "where recordings go that a page begins (default: here)", "FOLDER");
-  add_text(*command, "--page", options->page, "files of the page instead of those in the program",
-           "FOLDER");
+           "folder for recordings that a page starts (default: the present folder)", "FOLDER");
+  add_text(*command, "--page", options->page,
+           "use the files of the page in this folder instead of the built-in files", "FOLDER");
   add_fields(*command, options->fields,
-             "state fields to ask for (default ALL, on a CAN bus DEFAULT)");
+             "state fields to request (default ALL, on a CAN bus DEFAULT)");
   add_repeated(*command, "--device", options->devices,
-               "a described one on the user's I2C bus, such as bno055@0x28: what it measures",
+               "show the values of a described device on the I2C bus, such as bno055@0x28",
                "NAME@ADDRESS");
   add_duration(*command, options->duration);
   add_key(*command, options->key);

@@ -68,7 +68,7 @@ void WebBoard::connect() {
         fmt::format("path {}: {}", path.name, to_text(path.state)));
     events_.on_change(set_.index);
   });
-  board_.on_restart([this] { say(Level::warning, "the board has begun again"); });
+  board_.on_restart([this] { say(Level::warning, "the board has restarted"); });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) {
       say(Level::info, "armed");
@@ -81,7 +81,7 @@ void WebBoard::connect() {
 
 void WebBoard::on_link(const LinkStatus& link) {
   const bool heard = is_heard(link.state);
-  if (heard && !heard_) say(Level::info, "the board is there");
+  if (heard && !heard_) say(Level::info, "the board is connected");
   const bool lost = link.state == HostLinkState::lost;
   if (lost && heard_) say(Level::warning, explain(url(), link).reason);
   heard_ = heard || (heard_ && !lost);  // a restart has already been reported

@@ -49,13 +49,13 @@ Wiring wiring_of(const std::string& source) {
 std::string_view words_of(WiringSource source) {
   switch (source) {
     case WiringSource::plan:
-      return "The plan, which nobody has confirmed: r4 wiring confirm";
+      return "The plan, which is not confirmed: r4 wiring confirm";
     case WiringSource::given:
       return "Given by the owner of the board";
     case WiringSource::damaged:
       break;
   }
-  return "The stored wiring is damaged: nothing is connected";
+  return "The stored wiring is damaged, so no signal is connected";
 }
 
 struct Count {
@@ -112,9 +112,9 @@ int diff(const WiringOptions& options) {
 int give_file(const WiringOptions& options) {
   give(options.second, load_wiring(options.first));
   print_text(
-      "the board keeps this wiring, and uses it from its next start on\n"
-      "outputs off first:   r4 stop {}\n"
-      "then press reset, or take the power away\n",
+      "the board has stored this wiring, and uses it after its next start\n"
+      "first switch the outputs off:   r4 stop {}\n"
+      "then press reset, or disconnect the power\n",
       options.second);
   return 0;
 }
@@ -141,18 +141,19 @@ int confirm(const WiringOptions& options) {
   const BoardWiring kept = ask(options.first);
   switch (kept.source) {
     case WiringSource::given:
-      print_text("the board has a wiring that its owner gave: there is nothing to confirm\n");
+      print_text(
+          "the board already has a wiring from its owner, so a confirmation is not needed\n");
       return 0;
     case WiringSource::damaged:
-      throw Error(ErrorKind::refused, options.first, "its stored wiring is damaged",
-                  "give it again: r4 wiring give FILE " + options.first);
+      throw Error(ErrorKind::refused, options.first, "the stored wiring of the board is damaged",
+                  "give the wiring again: r4 wiring give FILE " + options.first);
     case WiringSource::plan:
       break;
   }
   give(options.first, kept.wiring);
   print_text(
-      "the board keeps the plan as its wiring: from its next start on it drives its outputs\n"
-      "until then, after each start: r4 send {} E:CLEAR\n",
+      "the board has stored the plan as its wiring, and drives its outputs after its next start\n"
+      "until then, clear the fault: r4 send {} E:CLEAR\n",
       options.first);
   return 0;
 }
@@ -174,24 +175,24 @@ int run(const WiringOptions& options) {
     const int given = options.first.empty() ? 0 : options.second.empty() ? 1 : 2;
     if (given == each.count) return each.run(options);
     throw Error(ErrorKind::usage, options.action,
-                given < each.count ? "an argument is missing" : "it has an argument too many",
+                given < each.count ? "an argument is missing" : "there is one argument too many",
                 fmt::format("use r4 wiring {} {}", each.name, each.arguments));
   }
-  throw Error(ErrorKind::usage, options.action, "there is no such action",
+  throw Error(ErrorKind::usage, options.action, "this is not an action",
               "use check, template, diff, give, show or confirm");
 }
 
 constexpr const char* wiring_footer =
-    R"(A wiring file says which pin of the Giga, or which line of a chip, serves each signal of a board
-(docs/reference/wiring.md). The paper does not say it: the wiring without a file is our plan. A new
-board keeps its outputs off until it was given a wiring, or its owner has confirmed the plan.
-  check FILE        a fault is reported with its line, the reason and what to do
-  template          prints the plan as a file, to be compared with your board's schematic
-  diff FILE FILE    prints what is different in the second; in place of a file: plan, or a URL
-  give FILE URL     the board keeps it, and uses it from its next start on
-  show URL          prints the wiring that the board keeps, as a file
-  confirm URL       the owner of the board has compared the plan with it: the plan is its wiring
-A board takes and shows its wiring over USB only.
+    R"(A wiring file names the pin of the Giga, or the line of a chip, for each signal of a board
+(docs/reference/wiring.md). The paper does not give the wiring, so without a file the wiring is our
+plan. A new board keeps its outputs off until it is given a wiring, or its owner confirms the plan.
+  check FILE        reports a fault with its line, the reason and the fix
+  template          prints the plan as a file; compare it with your board's schematic
+  diff FILE FILE    prints the differences in the second wiring; a FILE may be plan, or a URL
+  give FILE URL     stores the wiring on the board, which uses it after its next start
+  show URL          prints the wiring that the board has stored, as a file
+  confirm URL       stores the plan as the wiring; first compare the plan with the board
+A board accepts and shows its wiring over USB only.
 
 Examples:
   r4 wiring template > robot.wiring
@@ -199,10 +200,10 @@ Examples:
   r4 wiring diff plan robot.wiring
   r4 wiring give robot.wiring serial:auto
   r4 wiring confirm serial:auto
-  r4 sim --wiring robot.wiring         a simulated board that is wired so
+  r4 sim --wiring robot.wiring         a simulated board with this wiring
 
-Exit codes: 0 done; 1 a wiring is not possible, or diff found a difference; 2 usage, also a URL that is not
-a cable; 3 the board did not take it; 4, 5 a file or the transport cannot be opened.)";
+Exit codes: 0 done; 1 a wiring is not valid, or diff found a difference; 2 usage, or the URL is not
+a cable; 3 the board did not accept the wiring; 4, 5 a file or the transport cannot be opened.)";
 
 }  // namespace
 
@@ -210,10 +211,11 @@ void add_wiring(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<WiringOptions>();
   CLI::App* const command = add_subcommand(
       root, chosen, "wiring", "Check and set how a board is wired", wiring_footer, options, run);
-  add_text(*command, "ACTION", options->action, "what to do: see below",
+  add_text(*command, "ACTION", options->action, "the action: see below",
            "check|template|diff|give|show|confirm", Need::required);
   add_text(*command, "FILE", options->first, "a wiring file, or a URL", file_type);
-  add_text(*command, "SECOND", options->second, "diff: the second; give: the URL", file_type);
+  add_text(*command, "SECOND", options->second, "for diff: the second wiring; for give: the URL",
+           file_type);
   add_json(*command, options->json, "print the result as JSON, one object a line");
 }
 

@@ -9,8 +9,8 @@ namespace {
 constexpr Text texts[] = {
     "none",
     "the bus did not accept a frame in time (N_As)",
-    "no flow control in time (N_Bs)",
-    "no consecutive frame in time (N_Cr)",
+    "flow control did not come in time (N_Bs)",
+    "the next consecutive frame did not come in time (N_Cr)",
     "wrong sequence number",
     "interrupted by another transfer",
     "longer than the receiver's buffer",

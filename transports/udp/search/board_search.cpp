@@ -170,18 +170,17 @@ Problem nothing_found(const BoardSearch::Result& result, const WantedBoard& want
   const std::string asked = fmt::format("{}", fmt::join(interfaces, ", "));
   if (asked.empty()) {
     return {ErrorKind::open, "",
-            trouble.empty() ? "this computer is in no network"
+            trouble.empty() ? "this computer is not connected to a network"
                             : fmt::format("nothing can be sent ({})", trouble),
-            "join the network of the board"};
+            "connect this computer to the board's network"};
   }
-  return {
-      ErrorKind::open, "",
-      wanted.called.empty()
-          ? fmt::format("no R4 board answered (asked on {})", asked)
-          : fmt::format("no board called '{}' answered, {} other{} did (asked on {})",
-                        wanted.called, result.others, result.others == 1 ? "" : "s", asked),
-      "switch it on and join its network; where broadcast does not pass, give its address as in "
-      "udp://192.168.1.77"};
+  return {ErrorKind::open, "",
+          wanted.called.empty()
+              ? fmt::format("no R4 board answered (asked on {})", asked)
+              : fmt::format("no board named '{}' answered, but {} other board{} did (asked on {})",
+                            wanted.called, result.others, result.others == 1 ? "" : "s", asked),
+          "switch the board on and connect to its network; if broadcast does not pass, give its "
+          "address, as in udp://192.168.1.77"};
 }
 
 Problem several_found(const std::vector<AnsweredBoard>& boards, const WantedBoard& wanted,
@@ -194,7 +193,7 @@ Problem several_found(const std::vector<AnsweredBoard>& boards, const WantedBoar
   if (boards.size() > most_listed || result.more) list += ", …; r4 list shows more";
   return {ErrorKind::usage, "",
           wanted.called.empty() ? "several boards answered"
-                                : fmt::format("several boards are called '{}'", wanted.called),
+                                : fmt::format("several boards are named '{}'", wanted.called),
           "use one of " + list};
 }
 

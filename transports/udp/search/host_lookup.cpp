@@ -53,7 +53,7 @@ FoundHost HostLookup::find(const std::string& host) const {
   ask_in_a_thread([ask = resolve, host] { return ask(host); },
                   [answer](FoundHost each) { answer->set_value(std::move(each)); });
   if (found.wait_for(patience) == std::future_status::ready) return found.get();
-  return {{}, "no name server answers"};
+  return {{}, "the name server does not answer"};
 }
 
 asio::ip::address address_of(const FoundHost& found, const std::string& host,
@@ -63,15 +63,15 @@ asio::ip::address address_of(const FoundHost& found, const std::string& host,
   }
   if (found.addresses.empty()) {
     throw Error(ErrorKind::open, thing,
-                fmt::format("there is no host '{}' ({})", host, found.reason),
+                fmt::format("the host '{}' was not found ({})", host, found.reason),
                 "check the name, or give the IP address");
   }
   const auto v4 = std::find_if(found.addresses.begin(), found.addresses.end(),
                                [](const asio::ip::address& each) { return each.is_v4(); });
   asio::ip::address address = v4 != found.addresses.end() ? *v4 : found.addresses.front();
   if (address.is_multicast() || address == asio::ip::address_v4::broadcast()) {
-    throw Error(ErrorKind::usage, thing, host + " is the address of many, not of one",
-                "give the IP address of the board itself");
+    throw Error(ErrorKind::usage, thing, host + " is a multicast or broadcast address",
+                "give the IP address of one board");
   }
   return address;
 }

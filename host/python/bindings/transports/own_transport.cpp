@@ -66,7 +66,8 @@ class Methods {
 
  private:
   static std::string reason_of(const py::error_already_set& error) {
-    std::string reason = "it raised " + std::string(py::str(error.type().attr("__name__")));
+    std::string reason =
+        "the transport raised " + std::string(py::str(error.type().attr("__name__")));
     try {
       const auto text =
           from_python([&] { return PyObject_Str(error.value().ptr()); }).cast<std::string>();

@@ -17,7 +17,7 @@ namespace {
 constexpr const char* bus_off = "the controller is bus-off: too many errors";
 constexpr const char* warns = "the controller warns of errors";
 constexpr const char* passive = "the controller is error-passive";
-constexpr const char* over = "the trouble is over";
+constexpr const char* over = "the errors have stopped";
 constexpr const char* lonely = "no node acknowledges the frames";
 constexpr const char* look = "check wiring, termination and bit rate";
 
@@ -31,7 +31,7 @@ TEST_F(CanBusTest, BusOffIsDownWithAFixAndARestartIsUp) {
   EXPECT_EQ(member.events, (Told{{Kind::down, bus_off}}));
   EXPECT_EQ(member.fix, std::string(look) +
                             ", then: ip link set vxcan7 type can restart (slcan: down, and up); "
-                            "with restart-ms 100 it does so by itself");
+                            "with restart-ms 100 the interface restarts by itself");
   EXPECT_FALSE(bus->up());
   local.send(error(CAN_ERR_RESTARTED));
   ASSERT_TRUE(run_until([&] { return member.events.size() == 2; }));
@@ -179,7 +179,7 @@ TEST_F(CanBusTest, AnUnreadableInterfaceIsNotReportedAsMissing) {
   const auto refused = error_of([&] { socket.open(); });
   ASSERT_EQ(0, ::setrlimit(RLIMIT_NOFILE, &before));
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->problem().reason.find("the system does not tell about it"), 0U)
+  EXPECT_EQ(refused->problem().reason.find("the state of the interface is unknown"), 0U)
       << refused->what();
   EXPECT_NE(refused->problem().fix.find("AF_NETLINK"), std::string::npos) << refused->what();
   EXPECT_NO_THROW(socket.open());
@@ -195,7 +195,7 @@ TEST_F(CanBusTest, IsDownUntilTheKernelAcceptsItsFilters) {
   EXPECT_TRUE(member.events.empty()) << "reported by the loop, not within join()";
   ASSERT_TRUE(run_until([&] { return !member.events.empty(); }));
   EXPECT_EQ(member.events.back().first, Kind::down);
-  EXPECT_EQ(member.events.back().second.find("the kernel does not take the filters"), 0U);
+  EXPECT_EQ(member.events.back().second.find("the kernel does not accept the CAN filters"), 0U);
   EXPECT_NE(member.fix.find("fewer nodes"), std::string::npos);
   run_for(soon);  // during this time the bus tries again
   EXPECT_FALSE(bus->up());

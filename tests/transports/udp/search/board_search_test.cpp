@@ -205,7 +205,7 @@ TEST(FindBoard, FindsABoardByNameAndById) {
   const FoundHost none = find_board(boards.search(), {"middle", ""});
   ASSERT_TRUE(none.problem);
   EXPECT_EQ(none.problem->kind, ErrorKind::open);
-  EXPECT_NE(none.problem->reason.find("no board called 'middle' answered, 2 others did"),
+  EXPECT_NE(none.problem->reason.find("no board named 'middle' answered, but 2 other boards did"),
             std::string::npos)
       << none.problem->reason;
   EXPECT_NE(none.problem->fix.find("udp://"), std::string::npos) << none.problem->fix;
@@ -217,7 +217,7 @@ TEST(FindBoard, RefusesAnAmbiguousNameUnlessTheLastIdIsKnown) {
   boards.add("0.3", {identity("two", "NAME:left;")});
   const FoundHost found = find_board(boards.search(), {"left", ""});
   ASSERT_TRUE(found.problem);
-  EXPECT_EQ(found.problem->reason, "several boards are called 'left'");
+  EXPECT_EQ(found.problem->reason, "several boards are named 'left'");
   EXPECT_NE(found.problem->fix.find("udp:?id=one"), std::string::npos) << found.problem->fix;
   EXPECT_NE(found.problem->fix.find("udp:?id=two"), std::string::npos) << found.problem->fix;
   const FoundHost again = find_board(boards.search(), {"left", "two"});

@@ -26,29 +26,29 @@ std::optional<Mismatch> wrong_type(const OwnEndpoint& ours, const Announced& oth
   if (other.kind == EndpointKind::writer) {
     return Mismatch{
         Weight::lost,
-        fmt::format("{}: a publisher ({}) has the type {}, and is not heard; publish {}", ours.name,
-                    other.owner_text(), ros_type(other.type), expected)};
+        fmt::format(
+            "{}: a publisher ({}) has the wrong type {}, so its messages are ignored; publish {}",
+            ours.name, other.owner_text(), ros_type(other.type), expected)};
   }
   return Mismatch{
       Weight::warning,
-      fmt::format("{}: a subscriber ({}) has the type {}, and receives nothing; subscribe to {}",
-                  ours.name, other.owner_text(), ros_type(other.type), expected)};
+      fmt::format(
+          "{}: a subscriber ({}) has the wrong type {}, so it receives nothing; subscribe to {}",
+          ours.name, other.owner_text(), ros_type(other.type), expected)};
 }
 
 std::optional<Mismatch> wrong_policy(const OwnEndpoint& ours, const Announced& other,
                                      const char* policy) {
   if (other.kind == EndpointKind::writer) {
-    return Mismatch{
-        Weight::lost,
-        fmt::format("{}: a publisher does not offer what this subscription needs, {}, and is not "
-                    "heard ({}); have it do so, as ROS does by default",
-                    ours.name, policy, other.owner_text())};
+    return Mismatch{Weight::lost,
+                    fmt::format("{}: a publisher does not offer the required {}, so its messages "
+                                "are ignored ({}); use the default settings of ROS",
+                                ours.name, policy, other.owner_text())};
   }
-  return Mismatch{
-      Weight::warning,
-      fmt::format("{}: a subscriber asks for more than this publisher offers, in {}, and receives "
-                  "nothing ({}); subscribe as ROS does by default",
-                  ours.name, policy, other.owner_text())};
+  return Mismatch{Weight::warning,
+                  fmt::format("{}: a subscriber requires more {} than this publisher offers, so it "
+                              "receives nothing ({}); use the default settings of ROS",
+                              ours.name, policy, other.owner_text())};
 }
 
 // Requests in the form of rmw_fastrtps, without a client id (docs/how-to/ros2.md, Services).
@@ -60,9 +60,9 @@ bool cannot_be_answered(const OwnEndpoint& ours, const Announced& other) {
 std::optional<Mismatch> no_answer(const OwnEndpoint& ours, const Announced& other) {
   return Mismatch{
       Weight::lost,
-      fmt::format("{}: a client ({}) does not use rmw_cyclonedds_cpp, and gets no answer; nothing "
-                  "is executed for it: set RMW_IMPLEMENTATION=rmw_cyclonedds_cpp for it, or use "
-                  "the topics arm, stop and R4_Command",
+      fmt::format("{}: a client ({}) does not use rmw_cyclonedds_cpp, so its requests are not "
+                  "executed or answered; set RMW_IMPLEMENTATION=rmw_cyclonedds_cpp for the client, "
+                  "or use the topics arm, stop and R4_Command",
                   ours.name, other.owner_text())};
 }
 
@@ -80,7 +80,7 @@ std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced&
       of_type = own.other_type(other);
     } catch (const Error& error) {  // Cyclone DDS cannot create a reader for that type
       of_type =
-          Mismatch{Weight::lost, fmt::format("{}: a publisher ({}) is not heard: {}", own.name,
+          Mismatch{Weight::lost, fmt::format("{}: a publisher ({}) is not received: {}", own.name,
                                              other.owner_text(), error.problem().text())};
     }
   }

@@ -12,9 +12,8 @@ namespace r4::tool::ros2 {
 Entity::Entity(dds_entity_t made, const std::string& what) : entity_(made) {
   if (made >= 0) return;
   entity_ = 0;
-  throw Error(ErrorKind::open, what, fmt::format("Cyclone DDS says: {}", dds_strretcode(-made)),
-              "look at what CYCLONEDDS_URI and the environment of ROS say, and that the network "
-              "interface is "
+  throw Error(ErrorKind::open, what, fmt::format("Cyclone DDS reports: {}", dds_strretcode(-made)),
+              "check CYCLONEDDS_URI and the environment of ROS, and that the network interface is "
               "up (docs/how-to/ros2.md)");
 }
 

@@ -34,8 +34,8 @@ void require_low_descriptors(const std::string& what) {
               fmt::format("too many files are open in this process; Cyclone DDS needs {} free "
                           "descriptors below {}",
                           needed, FD_SETSIZE),
-              "start r4 ros2 from a program that does not pass on its open files, and raise "
-              "`ulimit -n` if it is lower");
+              "start r4 ros2 from a program that does not pass its open files to r4 ros2, and "
+              "raise `ulimit -n` if it is lower");
 }
 
 Entity join(const Domain& domain) {

@@ -19,9 +19,9 @@ bool is_part(std::string_view part) {
 
 void require(bool valid, std::string_view what, std::string_view text) {
   if (valid) return;
-  throw Error(ErrorKind::usage, std::string(what) + " " + std::string(text),
-              "is not a valid name in ROS 2",
-              "use letters, digits and single underscores, no digit first, as in arm_left");
+  throw Error(
+      ErrorKind::usage, std::string(what) + " " + std::string(text), "is not a valid name in ROS 2",
+      "use letters, digits and single underscores, beginning with a letter, such as arm_left");
 }
 
 }  // namespace

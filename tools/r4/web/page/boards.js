@@ -3,16 +3,16 @@
 import {board_name, element, put} from './text.js';
 
 const SAFE_WORDS = {
-  link: 'nobody controls it', stop: 'it was stopped', handle: "the dead-man's handle is released",
-  proximity: 'an obstacle is near', watchdog: 'its watchdog struck', fault: 'it has a fault',
+  link: 'no host controls the board', stop: 'the board was stopped', handle: "the dead-man's handle is released",
+  proximity: 'an obstacle is near', watchdog: "the board's watchdog acted", fault: 'the board has a fault',
 };
 
 function verdict(health) {
-  if (!health) return ['lost', 'Unknown', 'nothing is known of it at the moment'];
+  if (!health) return ['lost', 'Unknown', 'the state of the board is unknown'];
   if (health.link === 'lost') return ['lost', 'Lost', health.why || 'the board does not answer'];
-  if (health.link === 'connecting') return ['lost', 'Connecting', health.why || 'nothing was heard of it yet'];
+  if (health.link === 'connecting') return ['lost', 'Connecting', health.why || 'nothing was received from the board yet'];
   if (health.safe) return ['safe', 'Safe', health.why || SAFE_WORDS[health.safe] || health.safe];
-  if (health.armed) return ['armed', 'Armed', 'outputs obey'];
+  if (health.armed) return ['armed', 'Armed', 'outputs obey commands'];
   return ['idle', 'Active', `not armed${health.disarmed ? `: ${health.disarmed}` : ''}`];
 }
 
@@ -40,7 +40,7 @@ class Card {
       this.#answer.className = result.ok ? 'good' : 'bad';
     };
     this.#arm.title = 'clears what can be cleared, and closes the relay of the motor supply';
-    this.#clear.title = 'takes a stop, a watchdog or a fault away; moves nothing';
+    this.#clear.title = 'clears a stop, a watchdog or a fault; does not move anything';
     this.#arm.onclick = () => ask('arm');
     this.#clear.onclick = () => ask('clear');
     this.node = element('article', {className: 'card', 'aria-label': `Board ${board_name(board)}`},
@@ -98,6 +98,6 @@ export class Boards {
   missing() {
     return this.boards.filter((board) => this.health[board.board]?.link === 'lost')
       .map((board) => `${board_name(board)} does not answer: ${this.health[board.board].why || 'its link is lost'}. ` +
-        'It makes itself safe, and is shown again as soon as it is heard.');
+        'The board goes safe by itself. It is shown again when its datagrams arrive.');
   }
 }

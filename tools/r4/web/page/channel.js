@@ -60,7 +60,7 @@ export class Channel {
       const {name: speed, ...limits} = this.#kind.speed;
       this.#speed = element('input', {type: 'number', className: 'speed', ...limits, title: speed,
         'aria-label': `${label} ${speed}`});
-      const zero = element('button', {type: 'button', title: 'its encoder and stepper count from 0 here',
+      const zero = element('button', {type: 'button', title: 'sets the counts of the encoder and the stepper to 0',
         'aria-label': `${label}: zero here`}, '=0');
       zero.onclick = () => this.#send(`Z:${this.#channel}`);
       parts.push(this.#speed, zero);

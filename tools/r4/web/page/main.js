@@ -39,7 +39,7 @@ let server_lost = '';
 link.addEventListener('hello', ({detail}) => {
   const same = hello && JSON.stringify([hello.boards, hello.fields, hello.channels]) ===
     JSON.stringify([detail.boards, detail.fields, detail.channels]);
-  if (hello) add_event('info', 'r4 web is back');
+  if (hello) add_event('info', 'r4 web is connected again');
   hello = detail;
   document.title = `R4 ${hello.boards.map(board_name).join(', ')}`;
   if (same) {
@@ -61,9 +61,9 @@ link.addEventListener('hello', ({detail}) => {
 
 link.addEventListener('lost-server', ({detail}) => {
   server_lost = detail.refused ?
-    'r4 web refuses this page: open the address that it printed, with its #token=, or look whether it has too many pages.' :
-    'The connection to r4 web is lost: it has ended, or the network is down. Nothing here is live. ' +
-    'A board that this page drove makes itself safe. Trying again …';
+    'r4 web refuses this page: open the printed address with its #token=, or close other pages.' :
+    'The connection to r4 web is lost: r4 web has ended, or the network is down. The values on this page are old. ' +
+    'The boards that this page drove go safe. Trying again …';
   put(at('server'), 'Not connected');
   document.documentElement.classList.add('stale');
   at('control').disabled = true;
@@ -104,7 +104,7 @@ link.addEventListener('error', ({detail}) => add_event('error', detail.text));
 let released_why = '';
 function show_control(control) {
   const words = control.you ? 'You control' : control.holder !== null ? `Browser ${control.holder} controls; you watch` :
-    'Nobody controls; you watch';
+    'No browser is in control; you watch';
   put(at('holder'), [words, (control.holder === null && released_why) || control.why].filter(Boolean).join(': '));
   put(at('control'), control.you ? 'Give control back' : 'Take control');
   at('control').setAttribute('aria-pressed', String(control.you));
@@ -128,8 +128,8 @@ function stop() {
   stopped_ms = performance.now();
   const sent = link.stop();
   outputs?.forget();
-  add_event(sent ? 'info' : 'error', sent ? 'STOP was pressed here' :
-    'STOP was not sent: there is no connection to r4 web. It is sent as soon as there is one. Cut the power.');
+  add_event(sent ? 'info' : 'error', sent ? 'STOP was pressed on this page' :
+    'STOP was not sent, because the connection to r4 web is lost. Cut the power. STOP is sent after a reconnection.');
   at('stop').classList.remove('pressed');
   requestAnimationFrame(() => at('stop').classList.add('pressed'));
 }

@@ -198,7 +198,7 @@ export class Plots {
       return element('div', {className: 'row', 'data-unit': kind}, ...charts.map((chart) => chart.node));
     });
     document.getElementById('charts').replaceChildren(...(rows.length ? rows :
-      [element('p', {className: 'empty'}, 'Nothing is plotted. Tick a field.')]));
+      [element('p', {className: 'empty'}, 'There is no plot. Tick a field.')]));
   }
 
   set_clock(server_ms) { this.#clock_ahead_ms = server_ms - performance.now(); }
@@ -244,7 +244,7 @@ export class Plots {
   #set_paused(on) {
     this.paused = on;
     const button = document.getElementById('pause');
-    put(button, on ? 'Go on' : 'Pause');
+    put(button, on ? 'Continue' : 'Pause');
     button.setAttribute('aria-pressed', String(on));
     document.getElementById('plots').classList.toggle('paused', on);
   }

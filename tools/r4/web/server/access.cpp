@@ -68,7 +68,7 @@ ListenAddress listen_address(const std::string& text) {
   if (address.host.empty() ||
       (text.front() != '[' && address.host.find(':') != std::string::npos)) {
     throw Error(ErrorKind::usage, "--listen " + text, "is not ADDRESS:PORT",
-                "write it as in 127.0.0.1:8080, or 0.0.0.0:8080 for other computers");
+                "write an address such as 127.0.0.1:8080, or 0.0.0.0:8080 for other computers");
   }
   return address;
 }
@@ -76,8 +76,8 @@ ListenAddress listen_address(const std::string& text) {
 std::string host_name(const std::string& text) {
   const std::string name = name_in(text);
   if (name.empty() || name.find_first_of("/@? ") != std::string::npos) {
-    throw Error(ErrorKind::usage, "--host " + text, "is not a name",
-                "write it as in robot.example, or robot.example:8443");
+    throw Error(ErrorKind::usage, "--host " + text, "is not a valid name",
+                "write a name such as robot.example, or robot.example:8443");
   }
   return lower(text);
 }
@@ -92,7 +92,7 @@ bool is_loopback(std::string_view host) {
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    throw Error(ErrorKind::unsupported, "getrandom()", "gives no random bytes",
+    throw Error(ErrorKind::unsupported, "getrandom()", "does not give random bytes",
                 "listen at 127.0.0.1, where no token is needed");
   }
   std::string token;
@@ -114,11 +114,12 @@ const char* to_text(Verdict verdict) {
     case Verdict::allowed:
       return "allowed";
     case Verdict::wrong_host:
-      return "this server does not know that name; use the address that it printed, or --host";
+      return "this server does not know that name; use the printed address, or start r4 web with "
+             "--host";
     case Verdict::wrong_origin:
-      return "a page of another site asks; open the page of this server itself";
+      return "the request comes from a page of another site; open the page of this server";
     default:
-      return "the token is missing or wrong; use the address that was printed, as it is";
+      return "the token is missing or wrong; use the complete printed address";
   }
 }
 

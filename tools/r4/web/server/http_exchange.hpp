@@ -69,7 +69,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
       return refuse(http::status::request_header_fields_too_large, "the request is too long");
     }
     if (error == http::error::unexpected_body || error == http::error::body_limit) {
-      return refuse(http::status::payload_too_large, "nothing is taken here");
+      return refuse(http::status::payload_too_large, "this server does not accept a request body");
     }
     if (error.category() == http::make_error_code(http::error::bad_version).category() &&
         error != http::error::end_of_stream && error != http::error::partial_message) {
@@ -85,7 +85,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     const auto origins = request.equal_range(http::field::origin);
     if (std::distance(hosts.first, hosts.second) != 1 ||
         std::distance(origins.first, origins.second) > 1) {
-      return refuse(http::status::bad_request, "there must be one Host");
+      return refuse(http::status::bad_request, "the request needs exactly one Host");
     }
     if (websocket::is_upgrade(request) && server_.page) return upgrade();
     const std::string_view host = view(request[http::field::host]);
@@ -94,7 +94,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
       return refuse(http::status::forbidden, to_text(verdict));
     }
     if (request.method() != http::verb::get && request.method() != http::verb::head) {
-      return refuse(http::status::method_not_allowed, "only GET and HEAD are known here");
+      return refuse(http::status::method_not_allowed, "only GET and HEAD are possible");
     }
     const std::string_view target = view(request.target());
     const std::string_view path = target.substr(0, target.find('?'));
@@ -133,7 +133,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     if (verdict != Verdict::allowed) return refuse(http::status::unauthorized, to_text(verdict));
     if (server_.clients.size() >= most_clients) {
       return refuse(http::status::service_unavailable,
-                    "64 clients are here already, as many as may");
+                    "64 clients are connected already, which is the limit");
     }
     stream_.expires_never();
     const ClientId id = server_.next_number++;
@@ -152,7 +152,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     const PageFile* const file = changed                        ? &*changed
                                  : found != server_.files.end() ? &found->second
                                                                 : nullptr;
-    if (file == nullptr) return refuse(http::status::not_found, "there is nothing here");
+    if (file == nullptr) return refuse(http::status::not_found, "this page does not exist");
     const Request& request = parser_->get();
     const bool same = view(request[http::field::if_none_match]) == file->etag;
     Response response = make(same ? http::status::not_modified : http::status::ok, file->type);

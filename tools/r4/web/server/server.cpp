@@ -32,7 +32,7 @@ void Server::Impl::listen() {
       resolver.resolve(listen_address.host, std::to_string(listen_address.port), error);
   if (error || found.empty()) {
     throw Error(ErrorKind::open, name, "is not an address of this computer",
-                "ip address shows which there are");
+                "use an address that `ip address` shows");
   }
   const tcp::endpoint endpoint = found.begin()->endpoint();
   acceptor.open(endpoint.protocol(), error);
@@ -41,16 +41,15 @@ void Server::Impl::listen() {
   if (!error) acceptor.bind(endpoint, error);
   if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
   if (error == net::error::address_in_use) {
-    throw Error(ErrorKind::open, name, "another program listens there",
-                "end it, or name another port; with port 0 a free one is taken");
+    throw Error(ErrorKind::open, name, "another program listens at this address",
+                "end that program, or give another port; port 0 selects a free port");
   }
   if (error == net::error::access_denied) {
-    throw Error(ErrorKind::permission, name, "ports below 1024 are root's",
-                "take one above, such as 8080");
+    throw Error(ErrorKind::permission, name, "only root may use ports below 1024",
+                "give a higher port, such as 8080");
   }
   if (error) {
-    throw Error(ErrorKind::open, name, error.message(),
-                "ip address shows the addresses of this computer");
+    throw Error(ErrorKind::open, name, error.message(), "use an address that `ip address` shows");
   }
   listen_address.port = acceptor.local_endpoint().port();
 }
@@ -99,7 +98,7 @@ Server::Server(const ServerOptions& options, ServerEvents& events)
     : impl_(std::make_unique<Impl>(options, events)) {
   if (!options.page_folder.empty() && !std::filesystem::is_directory(options.page_folder)) {
     throw Error(ErrorKind::open, "--page " + options.page_folder, "is not a folder",
-                "name the folder of the page's files, such as tools/r4/web/page");
+                "give the folder of the page's files, such as tools/r4/web/page");
   }
   impl_->listen();
 }
