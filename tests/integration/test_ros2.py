@@ -433,6 +433,7 @@ def test_the_launch_example_starts_r4_ros2(monkeypatch):
 
 def test_the_wheel_speeds_example_keeps_the_commanded_speeds():
     base = example('wheel_speeds.py')['Base']()
+    base.supply = True
     speeds, now = [0.0, 0.0], 0.0
 
     def drive(seconds, *command):
@@ -454,6 +455,14 @@ def test_the_wheel_speeds_example_keeps_the_commanded_speeds():
     assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # the controller recovers from saturation
     base.command(1, 0, now)
     assert base.update((math.nan, 0), now) == [0, 0]
+    base.supply = False
+    for _ in range(500):  # not armed while cmd_vel continues: the wheels stand, and the error must not add up
+        now += 0.01
+        base.command(0.1, 0, now)
+        assert base.update((0, 0), now) == [0, 0]
+    base.supply = True
+    base.command(0.1, 0, now)
+    assert base.update((0, 0), now)[0] == pytest.approx(2 / 30 + 0.02 * 2, abs=0.01)
 
 
 def test_too_many_open_files_are_reported():

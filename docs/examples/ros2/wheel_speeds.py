@@ -42,6 +42,7 @@ class Base:
     def __init__(self):
         self.wheels = Wheel(), Wheel()
         self.wanted = 0.0, 0.0  # rad/s
+        self.supply = False  # relay 1 is closed: the motors have supply
         self.heard = self.updated = -math.inf
 
     def command(self, linear, angular, now):
@@ -58,8 +59,8 @@ class Base:
         """The duties of the two motors; `measured`: rad/s of the two encoders."""
         seconds = min(now - self.updated, 0.1)
         self.updated = now
-        if now - self.heard > CMD_VEL_TIMEOUT or not all(map(math.isfinite, measured)):
-            self.wanted = 0.0, 0.0
+        if not self.supply or now - self.heard > CMD_VEL_TIMEOUT or not all(map(math.isfinite, measured)):
+            self.wanted = 0.0, 0.0  # without supply the wheels cannot follow: begin from rest when it returns
         return [sign * wheel.duty(wanted, sign * speed, seconds)
                 for wheel, sign, wanted, speed in zip(self.wheels, SIGNS, self.wanted, measured)]
 
@@ -69,7 +70,7 @@ def main():
     from geometry_msgs.msg import Twist
     from rclpy.node import Node
     from sensor_msgs.msg import JointState
-    from std_msgs.msg import Float32
+    from std_msgs.msg import Float32, UInt32
 
     rclpy.init()
     node, base = Node('wheel_speeds'), Base()
@@ -82,6 +83,7 @@ def main():
             motor.publish(Float32(data=duty))
     node.create_subscription(Twist, 'cmd_vel',
                              lambda twist: base.command(twist.linear.x, twist.angular.z, time.monotonic()), 1)
+    node.create_subscription(UInt32, 'relays', lambda relays: setattr(base, 'supply', bool(relays.data & 1)), 1)
     node.create_subscription(JointState, 'joint_states', on_joints, 1)
     rclpy.spin(node)
 
