@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "r4link/board.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 #include <variant>
 
@@ -71,10 +73,7 @@ void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);
   const auto impl = impl_;
   const bool active = impl->wait_for_news(timeout, [&] {
-    const LinkStatus& link = impl->link;
-    if (link.cannot_begin()) return true;
-    if (impl->async.role() == BoardRole::watch) return is_heard(link.state);
-    return link.state == HostLinkState::active && link.in_control && !link.gated();
+    return impl->link.cannot_begin() || is_ready(impl->async.role(), impl->link);
   });
   const LinkStatus link = impl->read(impl->link);
   if (link.cannot_begin()) throw Error(explain(paths()));
@@ -134,11 +133,22 @@ void Board::ServoChannel::set(Microseconds pulse, Duration timeout) const {
 PostResult Board::ServoChannel::post(Microseconds pulse) const {
   return board_.post(Command::servo(channel_, pulse));
 }
+static std::size_t servo_index(int channel) {
+  if (channel >= 1 && channel <= servo_channels) return static_cast<std::size_t>(channel - 1);
+  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "the channel is out of range",
+              fmt::format("give 1 to {}", servo_channels));
+}
 void Board::ServoChannel::calibrate(const ServoCalibration& calibration) const {
-  board_.impl_->calibrate_servo(channel_, calibration);
+  const std::size_t index = servo_index(channel_);
+  const std::lock_guard lock(board_.impl_->mutex);
+  board_.impl_->servo_calibrations[index] = calibration;
 }
 ServoCalibration Board::ServoChannel::calibration() const {
-  return board_.impl_->servo_calibration(channel_);
+  const auto known = board_.impl_->read(board_.impl_->servo_calibrations[servo_index(channel_)]);
+  if (known) return *known;
+  throw Error(ErrorKind::usage, fmt::format("servo({})", channel_), "the servo is not calibrated",
+              "call calibrate() first, with the pulse and the angle at each end of the servo's "
+              "travel; or set a pulse in microseconds");
 }
 void Board::ServoChannel::set(Degrees angle, Duration timeout) const {
   set(calibration().pulse(angle), timeout);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_impl.hpp"
 
-#include <fmt/format.h>
-
 #include <asio/post.hpp>
 #include <utility>
 
@@ -62,23 +60,6 @@ void Board::Impl::close() {
   callbacks.stop();
 }
 
-static std::size_t servo_index(int channel) {
-  if (channel >= 1 && channel <= servo_channels) return static_cast<std::size_t>(channel - 1);
-  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "the channel is out of range",
-              fmt::format("give 1 to {}", servo_channels));
-}
-void Board::Impl::calibrate_servo(int channel, const ServoCalibration& calibration) {
-  const std::size_t index = servo_index(channel);
-  const std::lock_guard lock(mutex);
-  servo_calibrations[index] = calibration;
-}
-ServoCalibration Board::Impl::servo_calibration(int channel) {
-  if (const auto known = read(servo_calibrations[servo_index(channel)])) return *known;
-  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "the servo is not calibrated",
-              "call calibrate() first, with the pulse and the angle at each end of the servo's "
-              "travel; or set a pulse in microseconds");
-}
-
 void Board::Impl::keep(std::unique_ptr<Recording> own) {
   const std::lock_guard lock(mutex);
   recording.swap(own);
@@ -129,11 +110,9 @@ void Board::Impl::listen() {
 }
 
 void Board::Impl::take_name() {
-  const std::vector<PathStatus> paths = async.paths();
   const std::lock_guard lock(mutex);
   name = async.name();
-  path_names.clear();
-  for (const PathStatus& path : paths) path_names.push_back(path.name);
+  last_paths = async.paths();
 }
 
 // The timer expires when a callback may reach the limit.
@@ -201,7 +180,7 @@ void Board::Impl::require_sendable(const CommandOrGroup& what) {
   require_valid(command);
   require_control(async.role(), command);
   const std::lock_guard lock(mutex);
-  for (const std::string& path : path_names) require_cable(path, command);
+  for (const PathStatus& path : last_paths) require_cable(path.name, command);
 }
 
 void Board::Impl::execute(const CommandOrGroup& what, Duration timeout) {

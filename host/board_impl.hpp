@@ -70,10 +70,6 @@ struct Board::Impl final : BlockingLoop {
     return run_on_loop(what, [&] { now = ask(); }) ? now : read(last);
   }
 
-  // These functions throw Error{usage} if `channel` is not 1-16.
-  void calibrate_servo(int channel, const ServoCalibration& calibration);
-  ServoCalibration servo_calibration(int channel);
-
   void keep(std::unique_ptr<Recording> own);
 
   // --- on the loop
@@ -99,8 +95,8 @@ struct Board::Impl final : BlockingLoop {
   bool held_for_callback = false;
 
   // Shared by all threads, under the lock. A change of the state or the link notifies `news`.
-  std::string name;  // the transports' names
-  std::vector<std::string> path_names;
+  std::string name;                    // the transports' names
+  std::vector<PathStatus> last_paths;  // of the last event of a transport, or of the end
   ReceivedState state;
   std::uint64_t states = 0;
   std::vector<std::weak_ptr<States::Queue>> queues;
@@ -118,7 +114,6 @@ struct Board::Impl final : BlockingLoop {
   std::array<std::optional<ServoCalibration>, servo_channels> servo_calibrations;
   Statistics last_statistics;
   CarrierCounters last_counters;
-  std::vector<PathStatus> last_paths;
   std::unique_ptr<Recording> recording;
 };
 

@@ -161,59 +161,53 @@ bool sets(std::string_view key, const Command* command) {
 }
 
 Words refusal_words(const Command* command, Refusal code, const LinkStatus& link) {
-  Words words{
-      fmt::format("refused by the board: {} ({})",
-                  std::string_view(name_of(code).data(), name_of(code).size()), meaning_of(code)),
-      ""};
+  const std::string refused = fmt::format(
+      "refused by the board: {}", std::string_view(name_of(code).data(), name_of(code).size()));
+  const std::string reason = fmt::format("{} ({})", refused, meaning_of(code));
   switch (code) {
     case Refusal::unknown:
     case Refusal::format:
     case Refusal::range:
     case Refusal::channel:
-      words.fix = "check the board with r4 monitor, then try again";
-      if (command != nullptr) words.fix = bad_command(*command, code).fix;
       // An invalid key is never sent, so RANGE means that the board has no room for the key.
       if (code == Refusal::range && sets("key", command)) {
-        words.reason =
-            fmt::format("refused by the board: RANGE (it holds at most {} keys)", max_keys);
-        words.fix = "remove a key: C:key,id:off";
+        return {fmt::format("{} (it holds at most {} keys)", refused, max_keys),
+                "remove a key: C:key,id:off"};
       }
       if (code == Refusal::range && (sets("timeout", command) || sets("heartbeat", command))) {
-        words.fix =
+        return {
+            reason,
             "keep the board's heartbeat interval below its timeout, and set both in one step: r4 "
-            "send URL C:timeout,MS C:heartbeat,MS or link_timing()";
+            "send URL C:timeout,MS C:heartbeat,MS or link_timing()"};
       }
-      break;
-    case Refusal::safe:
-      if (link.state == HostLinkState::safe) {
-        const Words why = safe_words(link);
-        words.reason = fmt::format("refused by the board: SAFE ({})", why.reason);
-        words.fix = why.fix;
-      } else {
-        words.fix = "find the reason in the board's SAFE field";
+      if (command != nullptr) return {reason, bad_command(*command, code).fix};
+      return {reason, "check the board with r4 monitor, then try again"};
+    case Refusal::safe: {
+      if (link.state != HostLinkState::safe) {
+        return {reason, "find the reason in the board's SAFE field"};
       }
-      break;
+      const Words why = safe_words(link);
+      return {fmt::format("{} ({})", refused, why.reason), why.fix};
+    }
     case Refusal::busy:
-      words.fix = words_of(LinkCause::busy).fix;
-      break;
+      return {reason, words_of(LinkCause::busy).fix};
     case Refusal::stale:
-      words.fix = is(CommandKind::clear, command) ? "check the robot, because a stop or fault may "
-                                                    "have come since; then send the command again"
-                                                  : "send the command again if you still need it";
-      break;
+      return {reason, is(CommandKind::clear, command)
+                          ? "check the robot, because a stop or fault may have come since; then "
+                            "send the command "
+                            "again"
+                          : "send the command again if you still need it"};
     case Refusal::auth:
-      words.fix = is(CommandKind::setting, command) && is_site_setting(command->text)
-                      ? "send the command over USB: serial:auto"
-                      : words_of(LinkCause::key_needed).fix;
-      break;
+      return {reason, is(CommandKind::setting, command) && is_site_setting(command->text)
+                          ? "send the command over USB: serial:auto"
+                          : words_of(LinkCause::key_needed).fix};
     case Refusal::full:
-      words.fix = "send the command again when the present transfer has ended";
-      break;
+      return {reason, "send the command again when the present transfer has ended"};
     case Refusal::none:
     case Refusal::duplicate:
       break;
   }
-  return words;
+  return {reason, ""};
 }
 
 // Causes that hold back heartbeats and commands, but not a stop.
@@ -243,71 +237,58 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
   if (is(CommandKind::stop, command) && result.outcome != Outcome::confirmed) {
     return unconfirmed_stop_words(result, link);
   }
-  Words words;
   switch (result.outcome) {
     case Outcome::confirmed:
-      words.reason = "confirmed by the board's state";
-      break;
+      return {"confirmed by the board's state", ""};
     case Outcome::refused:
       if (result.transfer.outcome != I2cOutcome::done) {
         Problem why = failed_transfer({}, result.transfer.outcome);
         return {std::move(why.reason), std::move(why.fix)};
       }
       // Without a code, the board did not refuse the command: the link cannot begin.
-      if (result.code == Refusal::none) return link_words(link);
-      words = refusal_words(command, result.code, link);
-      break;
+      return result.code == Refusal::none ? link_words(link)
+                                          : refusal_words(command, result.code, link);
     case Outcome::timed_out: {
       if (result.at == 0 && result.executed != 0) {  // a transfer, not a group
         return {"the transfer has begun, and its end was not reported in time",
                 "give the transfer more time, or check the field I2CX"};
       }
       const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(result.elapsed).count();
-      words.reason = fmt::format("not confirmed within {} ms", ms);
       if (link.state == HostLinkState::active && link.causes.without(harmless).empty()) {
-        words.reason += "; the command may or may not have been executed";
-        words.fix =
+        return {
+            fmt::format("not confirmed within {} ms; the command may or may not have been executed",
+                        ms),
             "allow more time, or send the command again; `r4 bench` shows how many datagrams are "
-            "lost";
-      } else {
-        Words why = link_words(link);
-        words.reason += ": " + why.reason;
-        words.fix = std::move(why.fix);
+            "lost"};
       }
-      break;
+      const Words why = link_words(link);
+      return {fmt::format("not confirmed within {} ms: {}", ms, why.reason), why.fix};
     }
     case Outcome::cancelled:
-      words.reason =
+      return {
           "cancelled: by a stop, by a newer reason to be safe, by a restart of the board, or by "
-          "the program";
-      words.fix = "find the cause before you clear the board or repeat the command";
-      break;
+          "the program",
+          "find the cause before you clear the board or repeat the command"};
     case Outcome::closed:
-      words.reason = "given up: the board was closed";
-      words.fix = "open the board again";
-      break;
+      return {"given up: the board was closed", "open the board again"};
     case Outcome::blocked:
-      words.reason = "not confirmed: the board's thread does not answer";
-      words.fix = "let the functions of your own transport return at once";
-      break;
+      return {"not confirmed: the board's thread does not answer",
+              "let the functions of your own transport return at once"};
     case Outcome::full:
-      words.reason =
-          fmt::format("not sent: {} commands are under way already", Session::max_pending);
-      words.fix = "wait until some commands are confirmed";
-      break;
+      return {fmt::format("not sent: {} commands are under way already", Session::max_pending),
+              "wait until some commands are confirmed"};
     case Outcome::not_armed: {
       if (result.disarmed == DisarmCause::earlier_fault && is_of_wiring(link)) {
         const Words why = safe_words(link);
         return {"not armed: " + why.reason, why.fix};
       }
       Problem why = explain("", result.disarmed);
-      words = {std::move(why.reason), std::move(why.fix)};
-      break;
+      return {std::move(why.reason), std::move(why.fix)};
     }
     case Outcome::none:
       break;
   }
-  return words;
+  return {};
 }
 
 std::string group_words(std::size_t size, const CommandResult& result) {

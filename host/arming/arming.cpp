@@ -5,34 +5,39 @@ namespace r4 {
 
 namespace {
 
-DisarmCause cause_of(SafeReason reason) {
+constexpr std::uint8_t bit(SafeReason reason) {
+  return static_cast<std::uint8_t>(1U << static_cast<unsigned>(reason));
+}
+
+struct Meaning {
+  DisarmCause cause = DisarmCause::none;
+  // For a reason that only E:CLEAR ends: the cause if it may be older than the session or the boot.
+  DisarmCause earlier = DisarmCause::none;
+  // The reasons that only E:CLEAR ends, and that may hold while the board reports this reason. The
+  // board reports the gravest reason: a stop, then a fault, a watchdog, and the other reasons.
+  std::uint8_t may_hold = 0;
+};
+
+Meaning meaning_of(SafeReason reason) {
+  constexpr std::uint8_t from_watchdog = bit(SafeReason::watchdog);
+  constexpr std::uint8_t from_fault = bit(SafeReason::fault) | from_watchdog;
+  constexpr std::uint8_t from_stop = bit(SafeReason::stop) | from_fault;
   switch (reason) {
     case SafeReason::stop:
-      return DisarmCause::stop;
-    case SafeReason::handle:
-      return DisarmCause::handle;
-    case SafeReason::proximity:
-      return DisarmCause::proximity;
-    case SafeReason::watchdog:
-      return DisarmCause::watchdog;
+      return {DisarmCause::stop, DisarmCause::earlier_stop, from_stop};
     case SafeReason::fault:
-      return DisarmCause::fault;
+      return {DisarmCause::fault, DisarmCause::earlier_fault, from_fault};
+    case SafeReason::watchdog:
+      return {DisarmCause::watchdog, DisarmCause::earlier_watchdog, from_watchdog};
+    case SafeReason::handle:
+      return {DisarmCause::handle};
+    case SafeReason::proximity:
+      return {DisarmCause::proximity};
     case SafeReason::none:
     case SafeReason::link:
       break;
   }
-  return DisarmCause::none;
-}
-
-DisarmCause earlier_cause_of(SafeReason reason) {
-  switch (reason) {
-    case SafeReason::stop:
-      return DisarmCause::earlier_stop;
-    case SafeReason::watchdog:
-      return DisarmCause::earlier_watchdog;
-    default:
-      return DisarmCause::earlier_fault;
-  }
+  return {};
 }
 
 }  // namespace
@@ -46,28 +51,12 @@ void ArmingMachine::disarm(DisarmCause cause) {
 }
 
 void ArmingMachine::on_reason(SafeReason reason) {
-  const DisarmCause cause = cause_of(reason);
+  const DisarmCause cause = meaning_of(reason).cause;
   if (cause != DisarmCause::none && armed()) cause_ = cause;
 }
 
-// The board reports its gravest reason. A reason that only E:CLEAR ends may hide other reasons.
 void ArmingMachine::on_heard(SafeReason reason) {
-  switch (reason) {
-    case SafeReason::stop:
-      break;
-    case SafeReason::fault:
-      earlier_ = static_cast<std::uint8_t>(earlier_ & ~bit(SafeReason::stop));
-      break;
-    case SafeReason::watchdog:
-      earlier_ = static_cast<std::uint8_t>(earlier_ & bit(SafeReason::watchdog));
-      break;
-    case SafeReason::none:
-    case SafeReason::link:
-    case SafeReason::handle:
-    case SafeReason::proximity:
-      earlier_ = 0;
-      break;
-  }
+  earlier_ = static_cast<std::uint8_t>(earlier_ & meaning_of(reason).may_hold);
 }
 
 void ArmingMachine::on_sleep() {
@@ -90,24 +79,14 @@ ArmingMachine::Step ArmingMachine::next(SafeReason reason) {
   if (reason == SafeReason::link) return Step::wait;
   const bool first = attempt_ == Attempt::begun;
   attempt_ = reason == SafeReason::none ? Attempt::closing : Attempt::clearing;
-  switch (reason) {
-    case SafeReason::none:
-      return Step::close;
-    case SafeReason::stop:
-    case SafeReason::watchdog:
-    case SafeReason::fault: {
-      if ((earlier_ & bit(reason)) != 0) return fail(earlier_cause_of(reason));
-      const bool may_clear = (cleared_ & bit(reason)) == 0 && (first || reason != SafeReason::stop);
-      cleared_ = static_cast<std::uint8_t>(cleared_ | bit(reason));
-      if (may_clear) return Step::clear;
-      break;
-    }
-    case SafeReason::link:
-    case SafeReason::handle:
-    case SafeReason::proximity:
-      break;
-  }
-  return fail(cause_of(reason));
+  if (reason == SafeReason::none) return Step::close;
+  const Meaning meaning = meaning_of(reason);
+  if ((earlier_ & meaning.may_hold & bit(reason)) != 0) return fail(meaning.earlier);
+  const bool may_clear = meaning.earlier != DisarmCause::none && (cleared_ & bit(reason)) == 0 &&
+                         (first || reason != SafeReason::stop);
+  if (!may_clear) return fail(meaning.cause);
+  cleared_ = static_cast<std::uint8_t>(cleared_ | bit(reason));
+  return Step::clear;
 }
 
 ArmingMachine::Step ArmingMachine::fail(DisarmCause cause) {

@@ -61,9 +61,6 @@ class ArmingMachine {
   // `begun`: the board's reason has not been checked.
   enum class Attempt : std::uint8_t { none, begun, clearing, closing };
 
-  static std::uint8_t bit(SafeReason reason) {
-    return static_cast<std::uint8_t>(1U << static_cast<unsigned>(reason));
-  }
   Step fail(DisarmCause cause);
 
   DisarmCause cause_ = DisarmCause::not_yet;

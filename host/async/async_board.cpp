@@ -100,57 +100,6 @@ void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
   });
 }
 
-class AsyncBoard::TimingSteps final : public Impl::Sequence {
- public:
-  TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
-      : Sequence(impl, std::move(completion)),
-        steps_(std::move(steps)),
-        deadline_(Impl::steady_now() + timeout) {}
-
-  void begin() {
-    const LinkTimingStep& step = steps_[done_];
-    const std::string value = std::to_string(step.ms);
-    send(Command::setting(step.key, Text(value)),
-         std::max(Time{0}, deadline_ - Impl::steady_now()));
-  }
-  void complete(const CommandResult& result, How how) override {
-    if (result.outcome != Outcome::confirmed || ++done_ == steps_.size()) return end(result, how);
-    begin();
-  }
-
- private:
-  const std::vector<LinkTimingStep> steps_;
-  std::size_t done_ = 0;
-  const Time deadline_;
-};
-
-class AsyncBoard::TransferSteps final : public Impl::Sequence {
- public:
-  TransferSteps(Impl& impl, Time timeout, CompletionPtr completion)
-      : Sequence(impl, std::move(completion)), deadline_(Impl::steady_now() + timeout) {}
-
-  using Sequence::send;
-  void complete(const CommandResult& result, How how) override {
-    CommandResult ended = result;
-    if (!pnum_) {
-      if (ended.outcome != Outcome::confirmed) return end(ended, how);
-      pnum_ = ended.pnum;
-      return wait(Impl::Waits::For::answer, *pnum_, deadline_);
-    }
-    ended.pnum = *pnum_;
-    ended.executed = 1;
-    if (ended.outcome == Outcome::confirmed) {
-      ended.transfer = impl_.session.state().i2c_answer;
-      if (ended.transfer.outcome != I2cOutcome::done) ended.outcome = Outcome::refused;
-    }
-    end(ended, how);
-  }
-
- private:
-  const Time deadline_;
-  std::optional<std::uint32_t> pnum_;  // of the command, when the board has confirmed it
-};
-
 void AsyncBoard::start_transfer(const Command& command, Duration timeout,
                                 CompletionPtr completion) {
   if (command.kind != CommandKind::i2c_read && command.kind != CommandKind::i2c_write &&
@@ -158,28 +107,33 @@ void AsyncBoard::start_transfer(const Command& command, Duration timeout,
     throw Error(ErrorKind::usage, shown(command), "is not a valid transfer on the I2C bus",
                 "send it with send() or async_send()");
   }
-  (new TransferSteps(*impl_, bounded(timeout), std::move(completion)))
-      ->send(command, bounded(timeout));
+  const Time deadline = Impl::steady_now() + bounded(timeout);
+  // `pnum`: of the command, when the board has confirmed it.
+  const auto next = [deadline, pnum = std::optional<std::uint32_t>()](
+                        Impl::Sequence& steps, CommandResult result, Completion::How how) mutable {
+    if (!pnum) {
+      if (result.outcome != Outcome::confirmed) return steps.end(result, how);
+      pnum = result.pnum;
+      return steps.wait(Impl::Waits::For::answer, *pnum, deadline);
+    }
+    result.pnum = *pnum;
+    result.executed = 1;
+    if (result.outcome == Outcome::confirmed) {
+      result.transfer = steps.impl().session.state().i2c_answer;
+      if (result.transfer.outcome != I2cOutcome::done) result.outcome = Outcome::refused;
+    }
+    steps.end(result, how);
+  };
+  (new Impl::Steps(*impl_, std::move(completion), next))->send(command, bounded(timeout));
 }
 
-class AsyncBoard::Farewell final : public Impl::Sequence {
- public:
-  using Then = void (*)(Impl& impl);
-  Farewell(Impl& impl, Then then, CompletionPtr completion)
-      : Sequence(impl, std::move(completion)), then_(then) {}
-  void complete(const CommandResult& result, How how) override {
-    then_(impl_);
-    end(result, how);
-  }
-
- private:
-  const Then then_;
-};
-
 void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
+  const auto next = [](Impl::Sequence& steps, const CommandResult& result, Completion::How how) {
+    steps.impl().close();
+    steps.end(result, how);
+  };
   Impl& impl = *impl_;
-  const auto then = [](Impl& each) { each.close(); };
-  impl.begin(CompletionPtr(new Farewell(impl, then, std::move(completion))),
+  impl.begin(CompletionPtr(new Impl::Steps(impl, std::move(completion), next)),
              [&] { return impl.leave(bounded(timeout)); });
 }
 
@@ -207,11 +161,12 @@ void AsyncBoard::start_release_control(Duration timeout, CompletionPtr completio
     completion.release()->complete({Outcome::confirmed}, Completion::How::post);
     return;
   }
-  const auto then = [](Impl& each) {
-    if (each.is_open()) each.become(BoardRole::watch);
+  const auto next = [](Impl::Sequence& steps, const CommandResult& result, Completion::How how) {
+    if (steps.impl().is_open()) steps.impl().become(BoardRole::watch);
+    steps.end(result, how);
   };
   impl.begin(
-      CompletionPtr(new Farewell(impl, then, std::move(completion))),
+      CompletionPtr(new Impl::Steps(impl, std::move(completion), next)),
       [&] {
         impl.cancel_waits();
         return impl.session.release_control(bounded(timeout), impl.now);
@@ -225,9 +180,19 @@ void AsyncBoard::require_link_timing(Duration board_timeout, Duration heartbeat)
 
 void AsyncBoard::start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                                    CompletionPtr completion) {
-  (new TimingSteps(*impl_, link_timing_steps(board_timeout, heartbeat), bounded(timeout),
-                   std::move(completion)))
-      ->begin();
+  const Time deadline = Impl::steady_now() + bounded(timeout);
+  const auto next = [all = link_timing_steps(board_timeout, heartbeat), begun = std::size_t{0},
+                     deadline](Impl::Sequence& steps, const CommandResult& result,
+                               Completion::How how) mutable {
+    if (result.outcome != Outcome::confirmed || begun == all.size()) return steps.end(result, how);
+    const LinkTimingStep& step = all[begun++];
+    const std::string value = std::to_string(step.ms);
+    steps.send(Command::setting(step.key, Text(value)),
+               std::max(Time{0}, deadline - Impl::steady_now()));
+  };
+  // The first step begins as if a step before it were confirmed.
+  (new Impl::Steps(*impl_, std::move(completion), next))
+      ->complete({Outcome::confirmed}, Completion::How::post);
 }
 
 void AsyncBoard::require_sendable(const Command& command) const {

@@ -86,12 +86,9 @@ void AsyncBoard::Impl::on_sleep() {
 }
 
 bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
-  const LinkStatus& link = session.link();
   switch (condition.what) {
     case Waits::For::active:
-      return session.board_role() == BoardRole::watch
-                 ? is_heard(link.state)
-                 : link.state == HostLinkState::active && link.in_control;
+      return is_ready(session.board_role(), session.link());
     case Waits::For::answer:
       // With a pnum of 0, the state has no answer.
       return condition.pnum != 0 && session.state().i2c_answer.pnum == condition.pnum;
@@ -129,12 +126,14 @@ void AsyncBoard::Impl::open() {
     throw Error(ErrorKind::usage, paths.name(), "a board can be opened only once",
                 "make a new AsyncBoard for the same URL");
   }
-  std::size_t opened = 0;
   for (const auto& path : paths) {
-    opened += open_path(*path) ? 1 : 0;
+    open_path(*path);
     if (phase != Phase::made) return;  // a callback for `up` has closed the board
   }
-  if (opened == 0) throw Error(*paths[0].trouble);
+  if (std::all_of(paths.begin(), paths.end(),
+                  [](const auto& each) { return each->trouble.has_value(); })) {
+    throw Error(*paths[0].trouble);
+  }
   for (const auto& path : paths) {
     if (path->trouble) report_trouble(*path);
     if (phase != Phase::made) return;
@@ -143,14 +142,12 @@ void AsyncBoard::Impl::open() {
   sleep_watch = SleepWatch();
   due = steady_now();
   enter(Completion::How::post, [this] { poll_wanted = true; });
-  if (opened != paths.size()) open_again();
+  open_again();
 }
 
-bool AsyncBoard::Impl::open_path(Path& path) {
-  path.opened = false;
+void AsyncBoard::Impl::open_path(Path& path) {
   try {
     with_system_errors(path.carrier->name(), [&] { path.carrier->open(path); });
-    path.opened = true;
     path.trouble.reset();
   } catch (const Error& error) {
     if (phase == Phase::made && error.kind() == ErrorKind::usage) {
@@ -161,20 +158,20 @@ bool AsyncBoard::Impl::open_path(Path& path) {
     path.trouble = error.problem();
     if (news && phase == Phase::open) report_trouble(path);
   }
-  return path.opened;
 }
 
 void AsyncBoard::Impl::open_again() {
+  if (std::none_of(paths.begin(), paths.end(),
+                   [](const auto& each) { return each->trouble.has_value(); })) {
+    return;
+  }
   reopening.expires_after(open_interval);
   reopening.async_wait([self = shared_from_this()](const std::error_code& error) {
-    if (error || !self->has_link()) return;
-    bool failed = false;
+    if (error) return;
     for (const auto& path : self->paths) {
-      if (path->opened || !self->has_link()) continue;
-      self->guarded([&] { self->open_path(*path); });
-      failed = failed || !path->opened;
+      if (path->trouble && self->has_link()) self->guarded([&] { self->open_path(*path); });
     }
-    if (failed && self->has_link()) self->open_again();
+    if (self->has_link()) self->open_again();
   });
 }
 

@@ -33,6 +33,8 @@ struct AsyncBoard::Impl final : std::enable_shared_from_this<AsyncBoard::Impl> {
   using Path = BoardPath<Impl>;
   using Waits = r4::Waits<CompletionPtr>;
   class Sequence;
+  template <class Next>
+  class Steps;
   struct Callbacks {
     Subscribers<ReceivedState, Datagram> state;
     Subscribers<Datagram> heartbeat;
@@ -53,6 +55,7 @@ struct AsyncBoard::Impl final : std::enable_shared_from_this<AsyncBoard::Impl> {
   enum class Phase : std::uint8_t { made, open, leaving, closed };
   bool is_open() const { return phase == Phase::open; }
   bool has_link() const { return phase == Phase::open || phase == Phase::leaving; }
+  bool reports() const { return phase == Phase::made || phase == Phase::open; }
 
   // Throws Error{usage} for no transport, and for more than Session::most_paths.
   Impl(asio::io_context& context, std::vector<std::unique_ptr<Carrier>> transports,
@@ -148,7 +151,7 @@ struct AsyncBoard::Impl final : std::enable_shared_from_this<AsyncBoard::Impl> {
   bool has_come(const Waits::Condition& condition) const;
   void cancel(Ticket id);
   void open();
-  bool open_path(Path& path);
+  void open_path(Path& path);
   void report_trouble(Path& path) {
     on_carrier_event(path, {CarrierEvent::Kind::down, *path.trouble});
   }
@@ -225,10 +228,6 @@ class AsyncBoard::Impl::Sequence : public Completion {
   }
   void destroy() noexcept final { delete this; }
 
- protected:
-  Sequence(Impl& impl, CompletionPtr completion)
-      : impl_(impl), completion_(std::move(completion)) {}
-  virtual ~Sequence() = default;
   // Begins a step. complete() receives its end.
   void send(const Command& command, Time timeout) {
     impl_.begin(
@@ -246,6 +245,12 @@ class AsyncBoard::Impl::Sequence : public Completion {
     delete this;
     handler->complete(result, called);
   }
+  Impl& impl() const { return impl_; }
+
+ protected:
+  Sequence(Impl& impl, CompletionPtr completion)
+      : impl_(impl), completion_(std::move(completion)) {}
+  virtual ~Sequence() = default;
 
   Impl& impl_;  // owns this
 
@@ -253,6 +258,18 @@ class AsyncBoard::Impl::Sequence : public Completion {
   Ticket id_ = 0;  // of the first step; cancels all steps
   const Time started_ = steady_now();
   CompletionPtr completion_;
+};
+
+// A sequence in which next(sequence, result, how) begins the next step or calls end().
+template <class Next>
+class AsyncBoard::Impl::Steps final : public Sequence {
+ public:
+  Steps(Impl& impl, CompletionPtr completion, Next next)
+      : Sequence(impl, std::move(completion)), next_(std::move(next)) {}
+  void complete(const CommandResult& result, How how) override { next_(*this, result, how); }
+
+ private:
+  Next next_;
 };
 
 }  // namespace r4

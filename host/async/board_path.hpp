@@ -33,8 +33,7 @@ class BoardPath final : public Carrier::Handler {
   const std::size_t index;
   const std::unique_ptr<Carrier> carrier;
   RecordingTap tap;
-  bool opened = false;
-  std::optional<Problem> trouble;  // the last reason why the transport could not be opened
+  std::optional<Problem> trouble;  // why the transport is not open, after open()
 
  private:
   Owner& owner_;

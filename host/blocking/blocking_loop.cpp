@@ -2,7 +2,8 @@
 #include "blocking_loop.hpp"
 
 #include <asio/post.hpp>
-#include <exception>
+#include <atomic>
+#include <future>
 #include <utility>
 #include <variant>
 
@@ -87,40 +88,21 @@ bool BlockingLoop::post_to_loop(std::function<void()> action) {
 }
 
 bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()>& action) {
+  // `action` stays valid, because the caller waits while it runs.
   struct Turn {
-    bool begun = false;
-    bool abandoned = false;
-    bool over = false;
-    std::exception_ptr trouble;
-    std::condition_variable ended;
+    std::atomic<bool> taken{false};  // begun by the loop, or abandoned by the caller
+    std::packaged_task<void()> task;
   };
   const auto turn = std::make_shared<Turn>();
-  std::unique_lock lock(mutex);
-  if (closed) return false;
-  // `action` stays valid, because the caller waits while it runs.
-  asio::post(io, [this, turn, &action] {
-    std::unique_lock loop_lock(mutex);
-    if (turn->abandoned) return;
-    turn->begun = true;
-    loop_lock.unlock();
-    try {
-      action();
-    } catch (...) {
-      turn->trouble = std::current_exception();
-    }
-    loop_lock.lock();
-    turn->over = true;
-    turn->ended.notify_all();
+  turn->task = std::packaged_task<void()>(std::cref(action));
+  std::future<void> ended = turn->task.get_future();
+  const bool open = post_to_loop([turn] {
+    if (!turn->taken.exchange(true)) turn->task();
   });
-  const auto is_over = [&] { return turn->over; };
-  if (!turn->ended.wait_for(lock, patience, is_over)) {
-    if (!turn->begun) {
-      turn->abandoned = true;
-      throw blocked_error(what, "not done", name_.fix);
-    }
-    turn->ended.wait(lock, is_over);
-  }
-  if (turn->trouble) std::rethrow_exception(turn->trouble);
+  if (!open) return false;
+  const bool late = ended.wait_for(patience) != std::future_status::ready;
+  if (late && !turn->taken.exchange(true)) throw blocked_error(what, "not done", name_.fix);
+  ended.get();
   return true;
 }
 

@@ -30,15 +30,14 @@ void BridgeGuard::on_board_datagram(const Datagram& datagram, MessageKind kind, 
   if (!authentication_.required() || !datagram.has_time()) return;
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   const auto ahead = static_cast<std::int32_t>(t_ms - board_ms(now));
-  if (has_clock_ && ahead < 0 && ahead > restarted_ms) return;  // the datagram was delayed
-  has_clock_ = true;
+  if (told_ && ahead < 0 && ahead > restarted_ms) return;  // the datagram was delayed
   t_ms_ = t_ms;
   told_ = now;
 }
 
 // Estimates as the host does (Signer), and never lower, because the host receives each T later.
 std::uint32_t BridgeGuard::board_ms(Time now) const {
-  const Time::duration passed = now - told_;
+  const Time::duration passed = now - told_.value_or(now);
   return t_ms_ + ms_of(passed - passed / 32);
 }
 

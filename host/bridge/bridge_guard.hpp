@@ -14,6 +14,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "../../protocol/keys/authentication.hpp"
@@ -52,10 +53,9 @@ class BridgeGuard {
   Authentication authentication_;
   const bool trusted_;
   bool heard_ = false;
-  bool asks_ = false;  // the board's newest heartbeat requests signatures
-  bool has_clock_ = false;
+  bool asks_ = false;       // the board's newest heartbeat requests signatures
   std::uint32_t t_ms_ = 0;  // the board's clock at told_
-  Time told_;
+  std::optional<Time> told_;
 };
 
 }  // namespace r4

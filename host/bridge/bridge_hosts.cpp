@@ -75,10 +75,6 @@ bool BridgeHosts::poll(Time now) {
   return true;
 }
 
-bool BridgeHosts::is_served_at(Peer peer) const {
-  return std::find(served_.begin(), served_.end(), peer) != served_.end();
-}
-
 bool BridgeHosts::knows(Peer from, SessionId sid, Time now) const {
   return std::any_of(hosts_.begin(), hosts_.end(), [&](const Host& host) {
     return is_of(host, from, sid) && is_heard(host, now);

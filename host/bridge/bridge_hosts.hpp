@@ -52,7 +52,6 @@ class BridgeHosts {
 
   // The peers of the served hosts as of the last poll(), each peer once.
   const std::vector<Peer>& served() const { return served_; }
-  bool is_served_at(Peer peer) const;
   // True if a heartbeat of this host passed at most a timeout ago.
   bool knows(Peer from, SessionId sid, Time now) const;
   // True if this host is served, or was before a silence: it then passes at once, on every path.

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bridge_urls.hpp"
 
-#include <asio/io_context.hpp>
-#include <asio/ip/udp.hpp>
 #include <utility>
 
-#include "../../transports/file_descriptor.hpp"
+#include "../../transports/can/can_carrier.hpp"
 #include "../../transports/serial/serial_device.hpp"
+#include "../../transports/udp/network/udp_route.hpp"
 #include "../../transports/udp/udp_url.hpp"
 #include "r4link/discovery/url.hpp"
 #include "r4link/discovery/url_pattern.hpp"
@@ -21,13 +20,7 @@ constexpr const char* other_side = "name the board's own transport as the second
 bool is_ours(const std::string& host) {
   asio::error_code error;
   const auto address = asio::ip::make_address(host == "localhost" ? "127.0.0.1" : host, error);
-  if (error) return false;
-  asio::io_context io;
-  asio::ip::udp::socket socket(io);
-  const asio::ip::udp::endpoint any_port(address, 0);
-  open_close_on_exec(socket, any_port.protocol(), error);
-  if (!error) socket.bind(any_port, error);
-  return !error;
+  return !error && probe_route({address, UdpUrl::board_port}, address, {}) == 0;
 }
 
 void require_two_ports(const Url& hosts, const Url& board) {
@@ -49,8 +42,7 @@ void require_two_sides(const Url& hosts, const Url& board) {
   const std::string& scheme = hosts.scheme();
   bool same = hosts.text() == board.text();
   if (scheme == "can" && board.scheme() == "can") {
-    const auto node = [](const Url& url) { return url.get_number("node", 0, 31, 1); };
-    same = hosts.host() == board.host() && node(hosts) == node(board);
+    same = can_share_name(hosts).text == can_share_name(board).text;
   } else if ((scheme == "serial" || scheme == "pty") && board.scheme() == "serial") {
     same = same || (!hosts.path().empty() && hosts.path() != "auto" &&
                     resolve_links(hosts.path()) == resolve_links(board.path()));

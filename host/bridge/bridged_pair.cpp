@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bridged_pair.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <optional>
 #include <utility>
@@ -24,10 +25,6 @@ std::string_view view(Text text) { return {text.data(), text.size()}; }
 bool is_stop(const Datagram& datagram) {
   const bool may_be = datagram.command_count() != 1 || datagram.command().name() == "E";
   return may_be && asks_to_stop(datagram);
-}
-
-bool is_single(const Datagram& datagram, Text name) {
-  return datagram.command_count() == 1 && datagram.command().name() == name;
 }
 
 bool has_site_setting(const Datagram& datagram) {
@@ -163,11 +160,12 @@ void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now
 }
 
 void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
-  if (is_single(datagram, Text("W"))) return on_lease(datagram, from, now);
+  if (asks_to_watch(datagram)) return on_lease(datagram, from, now);
   const SessionId sid = datagram.session_id();
   const bool trusted = known_.trusts(from, sid, now);
   const Field& command = datagram.command();
-  const bool asks_who = is_single(datagram, Text("Q")) && command.values() == "ID";
+  const bool asks_who =
+      datagram.command_count() == 1 && command.name() == "Q" && command.values() == "ID";
   if (!asks_who && !is_allowed(datagram, MessageKind::command, from, now)) return;
   if (!asks_who && !known_.knows(from, sid, now)) {
     ++hosts_.counters.kept_out;  // without an answer, because the host's heartbeats are answered
@@ -236,20 +234,24 @@ void BridgedPair::on_lease(const Datagram& datagram, Peer from, Time now) {
     refusal = parse_fields(command.text, fields);
   }
   if (refusal != Refusal::none) {
-    if (leases_.take(ms_of(now))) answer(datagram, refusal, 0, from, now);
+    if (refusals_.take(ms_of(now))) answer(datagram, refusal, 0, from, now);
     return;
   }
-  const bool ends = command.value == 0;
-  switch (audience_.on_lease(from, ends, datagram.time_ms(), now)) {
-    case BridgeAudience::Effect::full:
-      if (leases_.take(ms_of(now))) answer(datagram, Refusal::busy, 0, from, now);
+  const Source watcher{0, from};
+  const auto rate_hz = static_cast<std::uint32_t>(command.value);
+  switch (watchers_.on_lease(watcher, rate_hz, datagram.time_ms(), false, ms_of(now))) {
+    case Watchers::Effect::watching:
+      return watch_.wish(datagram.command().values());
+    case Watchers::Effect::unproven: {
+      const std::uint32_t token = random_() | 1U;  // not 0, which is the T of a first W
+      watchers_.tell(watcher, token, ms_of(now));
+      return answer(datagram, Refusal::stale, token, from, now);
+    }
+    case Watchers::Effect::full:
+      return answer(datagram, Refusal::busy, 0, from, now);
+    case Watchers::Effect::ended:
+    case Watchers::Effect::ignored:
       return;
-    case BridgeAudience::Effect::watching:
-      if (!ends) watch_.wish(datagram.command().values());
-      return;
-    case BridgeAudience::Effect::unproven:
-      if (ends || !leases_.take(ms_of(now))) return;
-      return answer(datagram, Refusal::stale, audience_.new_token(from, now), from, now);
   }
 }
 
@@ -263,7 +265,6 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
   guard_.on_board_datagram(datagram, kind, now);
   report_trouble();
   if (datagram.has_pnum() && datagram.has_time()) {
-    board_known_ = true;
     board_pnum_ = datagram.pnum();
     board_t_ = datagram.time_ms();
     board_heard_ = now;
@@ -293,14 +294,16 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   const auto copy = [&](Peer peer) { send(hosts_, view(datagram.bytes()), priority, peer); };
   for (std::size_t i = 1; i < served.size(); ++i) copy(served[i]);
   const auto has_it = [&](Peer peer) {
-    return known_.is_served_at(peer) || (to_everyone && hosts_.end.reaches(peer));
+    return std::find(served.begin(), served.end(), peer) != served.end() ||
+           (to_everyone && hosts_.end.reaches(peer));
   };
-  audience_.for_each_watcher(now, [&](Peer peer) {
-    if (!has_it(peer)) copy(peer);
-  });
+  for (const Watcher& each : watchers_) {
+    if (each.period_ms != 0 && !has_it(each.at.peer)) copy(each.at.peer);
+  }
   if (is_state) return;
   audience_.for_each_listener(now, [&](Peer peer) {
-    if (!has_it(peer) && copies_.take(ms_of(now))) copy(peer);
+    const bool gets_it = has_it(peer) || watchers_.find({0, peer}) != nullptr;
+    if (!gets_it && copies_.take(ms_of(now))) copy(peer);
   });
 }
 
@@ -326,8 +329,9 @@ void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) 
 }
 
 void BridgedPair::watch_board(Time now) {
+  watchers_.poll(ms_of(now));
   if (!board_.opened || !known_.served().empty()) return;
-  if (!audience_.has_watchers(now)) watch_.wish_nothing();
+  if (!watchers_.any()) watch_.wish_nothing();
   if (!watch_.due(now)) return;
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
@@ -360,7 +364,7 @@ void BridgedPair::report_trouble() {
 // Answers in place of the board. `session`: the SESSION of a refusal.
 void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to,
                          Time now, std::optional<std::uint32_t> session) {
-  if (!asked.has_pnum() || !board_known_ || now - board_heard_ > clock_lifetime) return;
+  if (!asked.has_pnum() || !board_heard_ || now - *board_heard_ > clock_lifetime) return;
   Nack nack;
   nack.pnum = asked.pnum();
   nack.sid = asked.session_id();
@@ -371,7 +375,7 @@ void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t leas
   std::array<char, 160> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_nack(writer, nack);
-  const auto since = std::chrono::duration_cast<milliseconds>(now - board_heard_).count();
+  const auto since = std::chrono::duration_cast<milliseconds>(now - *board_heard_).count();
   const Text text = writer.finish(board_pnum_, board_t_ + static_cast<std::uint64_t>(since));
   send(hosts_, view(text), Priority::normal, to);
 }

@@ -6,7 +6,7 @@
 //                                      budget
 //               Q:ID                   from served hosts at once, from other peers within a budget
 //     board --> heartbeats             to served hosts, watchers, listeners (bridge_audience.hpp)
-//               states                 to served hosts and watchers
+//               states                 to served hosts and watchers (watchers.hpp)
 //               N, I                   to the named session if it is served, else to the peer that
 //                                      asked
 //
@@ -26,11 +26,13 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "../../protocol/link/answer_budget.hpp"
+#include "../../protocol/link/watchers.hpp"
 #include "../../transports/board_end.hpp"
 #include "bridge_audience.hpp"
 #include "bridge_guard.hpp"
@@ -129,15 +131,16 @@ class BridgedPair {
   BridgeHosts known_;
   BridgeGuard guard_;
   BridgeAudience audience_;
+  Watchers watchers_;
+  std::random_device random_;
   BridgeWatch watch_;
-  // Budgets for untrusted peers: datagrams to the board, answers to W, and heartbeats.
-  AnswerBudget asking_, leases_, copies_;
+  // Budgets for untrusted peers: datagrams to the board, refusals of W, and heartbeats.
+  AnswerBudget asking_, refusals_, copies_;
   BridgeGuard::Trouble reported_ = BridgeGuard::Trouble::none;
   // The board's newest packet number and clock, for answers in place of the board.
-  bool board_known_ = false;
   std::uint32_t board_pnum_ = 0;
   std::uint64_t board_t_ = 0;
-  Time board_heard_;
+  std::optional<Time> board_heard_;
 };
 
 }  // namespace r4

@@ -5,6 +5,7 @@
 #include <asio/use_future.hpp>
 #include <utility>
 
+#include "../session/session.hpp"
 #include "r4link/control/boot_clock.hpp"
 #include "r4link/discovery/url_pattern.hpp"
 
@@ -164,11 +165,7 @@ Fleet::Boards Fleet::Impl::wait_active(const Boards& which, Duration timeout) {
   const auto all_active = [&] {
     missing.clear();
     for (const std::size_t board : which) {
-      const LinkStatus& link = links[board];
-      const bool active = role == BoardRole::watch ? is_heard(link.state)
-                                                   : link.state == HostLinkState::active &&
-                                                         link.in_control && !link.gated();
-      if (!active) missing.push_back(board);
+      if (!is_ready(role, links[board])) missing.push_back(board);
     }
     return missing.empty();
   };

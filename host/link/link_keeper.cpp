@@ -45,12 +45,12 @@ void LinkKeeper::on_sent(const Sending& sending, SendResult result, Time now) {
 
 void LinkKeeper::on_busy(std::size_t path, std::optional<std::uint32_t> t_ms, Time now) {
   paths_.on_busy(path, t_ms, now);
-  if (paths_.all_busy(now)) role_.on_busy_until(paths_.all_busy_until(now));
+  if (const auto until = paths_.all_busy_until(now)) role_.on_busy_until(*until);
 }
 
 void LinkKeeper::on_own_command(std::uint32_t t_ms, Time now) {
   paths_.on_own_state(t_ms, now);
-  role_.on_own_command(!paths_.all_busy(now), now);
+  role_.on_own_command(!paths_.all_busy_until(now), now);
 }
 
 void LinkKeeper::ask_paths(Time now) {

@@ -17,18 +17,13 @@ using PathSet = std::uint8_t;
 constexpr PathSet path_bit(std::size_t index) { return static_cast<PathSet>(1U << index); }
 
 // The board's T, extrapolated from a received T: late by the datagram's delay, never ahead.
-class PathClock {
- public:
-  bool known() const { return known_; }
-  void forget() { known_ = false; }
-  void set(std::uint32_t t_ms, Time now) {
-    known_ = true;
-    board_ms_ = t_ms;
-    at_ms_ = to_ms(now);
-  }
+struct PathClock {
+  std::uint32_t board_ms = 0;  // the board's T at at_ms
+  std::uint32_t at_ms = 0;
+
   // How far `t_ms` is ahead of this clock at the time `at`, in ms.
   std::int32_t ahead(std::uint32_t t_ms, Time at) const {
-    return static_cast<std::int32_t>(t_ms - (board_ms_ + (to_ms(at) - at_ms_)));
+    return static_cast<std::int32_t>(t_ms - (board_ms + (to_ms(at) - at_ms)));
   }
   // True if a T sent after `since` may be of this boot: at most `late_ms` late, not in the future.
   bool fits(std::uint32_t t_ms, Time since, Time now, std::int32_t late_ms) const {
@@ -40,11 +35,6 @@ class PathClock {
   // The allowed delay of a T after a heartbeat `PNum:0;T:0`, or in an answer. Small, because the
   // paper's boards count T from 0: after a quick restart, T is only slightly smaller.
   static constexpr std::int32_t restart_tolerance_ms = 1'000;
-
- private:
-  bool known_ = false;
-  std::uint32_t board_ms_ = 0;  // the board's T at at_ms_
-  std::uint32_t at_ms_ = 0;
 };
 
 struct PathQuestions {
@@ -70,7 +60,7 @@ struct Path {
   bool other = false;       // leads to another board
   bool connecting = false;  // the last heartbeat had `PNum:0`
   std::uint32_t boot = 0;
-  PathClock clock;
+  std::optional<PathClock> clock;
   Time heard{0};
   Time heard_until{0};
   PathQuestions questions;

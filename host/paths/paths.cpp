@@ -29,7 +29,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   path.other = path.connecting = false;
   path.questions.answered = path.questions.in_doubt = false;
   path.questions.unanswered = 0;
-  path.clock.forget();
+  path.clock.reset();
   path.heard = path.heard_until = path.busy.until = Time{0};
   path.questions.ask_at = path.known || !up ? Time::max() : now;
   if (path.known && first_answer_.count() == 0) first_answer_ = now;
@@ -43,7 +43,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
 void Paths::on_sleep(Time now) {
   for (std::size_t i = 0; i < paths_.size(); ++i) {
     Path& path = paths_[i];
-    path.clock.forget();
+    path.clock.reset();
     path.connecting = false;
     path.heard = path.heard_until = path.busy.until = Time{0};
     path.questions.open = IdentityQuestion();
@@ -52,7 +52,7 @@ void Paths::on_sleep(Time now) {
     news_.restart(i);
     path.lease.renew(now);
   }
-  clock_.forget();
+  clock_.reset();
   news_.forget();
   own_ = {};
   anew_ = true;
@@ -112,8 +112,8 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   path.questions.round_trip = now - *asked;
   const bool later = *asked > proven_;
   // The answer was sent between the question and now, which bounds T.
-  const bool same = clock_.known() ? clock_.fits(t_ms, *asked, now, PathClock::restart_tolerance_ms)
-                                   : fits_others(path, t_ms, now);
+  const bool same = clock_ ? clock_->fits(t_ms, *asked, now, PathClock::restart_tolerance_ms)
+                           : fits_others(path, t_ms, now);
   if (!same && !later) {
     ask_soon(path, now);
     return Admission::yes;
@@ -128,7 +128,7 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
 bool Paths::poll(Time now) {
   if (begun_ || known() == 0 || two_boards()) return false;
   const bool asking = std::any_of(paths_.begin(), paths_.end(), [this](const Path& path) {
-    const bool compared = path.can_ask || path.clock.known() || is_only();
+    const bool compared = path.can_ask || path.clock || is_only();
     return path.up && !(path.known && compared);
   });
   if (asking && now < first_answer_ + patience) return false;
@@ -149,24 +149,24 @@ Time Paths::next(Time now) const {
 }
 
 bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
-  return path.clock.known() && path.clock.fits(t_ms, now, now, late_of(path));
+  return path.clock && path.clock->fits(t_ms, now, now, late_of(path));
 }
 
 bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
   return std::all_of(paths_.begin(), paths_.end(), [&](const Path& each) {
-    const bool knows = &each != &path && each.known && each.clock.known() && each.boot == boot_;
+    const bool knows = &each != &path && each.known && each.clock && each.boot == boot_;
     return !knows || in_clock(each, t_ms, now);
   });
 }
 
 bool Paths::fits(const Path& path, std::uint32_t t_ms, Time now) const {
   if (!begun_) return fits_others(path, t_ms, now);
-  return !clock_.known() || clock_.fits(t_ms, now, now, late_of(path));
+  return !clock_ || clock_->fits(t_ms, now, now, late_of(path));
 }
 
 void Paths::set_clock(std::size_t index, std::uint32_t t_ms, Time now) {
   Path& path = paths_[index];
-  path.clock.set(t_ms, now);
+  path.clock = {t_ms, to_ms(now)};
   if (path.boot == boot_) return;
   path.boot = boot_;
   news_.restart(index);
@@ -182,15 +182,15 @@ void Paths::begin_boot(std::uint32_t t_ms, Time now) {
   ++boot_;
   news_.forget();
   own_ = {};
-  clock_.set(t_ms, now);
+  clock_ = {t_ms, to_ms(now)};
 }
 
 // A listening path with another clock leads to another board or shows an earlier boot.
 void Paths::compare_those_that_listen(std::uint32_t t_ms, Time now) {
   anew_ = false;
   for (Path& each : paths_) {
-    if (each.can_ask || !each.clock.known() || in_clock(each, t_ms, now)) continue;
-    each.clock.forget();
+    if (each.can_ask || !each.clock || in_clock(each, t_ms, now)) continue;
+    each.clock.reset();
     if (!begun_) turn_away(each);
   }
 }
@@ -211,7 +211,7 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
     }
     if (!fits(path, t_ms, now)) {
       // The board has restarted if this path has carried and no other path carries.
-      const bool carried = path.clock.known() && path.boot == boot_;
+      const bool carried = path.clock && path.boot == boot_;
       const bool others_carry = (carrying(now) & ~path_bit(index)) != 0;
       if (!carried && !anew_) turn_away(path);
       if ((!carried && !anew_) || others_carry) return Admission::no;
@@ -244,8 +244,8 @@ bool Paths::admit_connecting(std::size_t index, Time now) {
   const auto lives = [now](const Path& each) { return is_heard(each, now) && !each.connecting; };
   if (!begun_ || those(lives) != 0) return false;
   const bool recent =
-      link_.echo() != 0 && r4::is_heard(link_.state()) && clock_.known() &&
-      -clock_.ahead(link_.echo(), now) <= static_cast<std::int32_t>(to_ms(timeout_));
+      link_.echo() != 0 && r4::is_heard(link_.state()) && clock_ &&
+      -clock_->ahead(link_.echo(), now) <= static_cast<std::int32_t>(to_ms(timeout_));
   if (!believed && recent) return false;
   news_.on_connecting();
   return true;
@@ -260,7 +260,7 @@ bool Paths::admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_
       return false;
     }
     // On a bus, the answer to a lease precedes the first state.
-    if (!path.known || path.clock.known()) return false;
+    if (!path.known || path.clock) return false;
     if (!fits(path, t_ms, now)) {
       if (!anew_) turn_away(path);
       return false;
@@ -273,7 +273,7 @@ bool Paths::admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_
 
 bool Paths::is_newest(std::size_t index, std::uint32_t t_ms, Time now) {
   if (!news_.is_newest(index, t_ms)) return false;
-  clock_.set(t_ms, now);
+  clock_ = {t_ms, to_ms(now)};
   return true;
 }
 
@@ -295,8 +295,7 @@ LinkCauses Paths::lease_causes(Time now) const {
 }
 
 void Paths::on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now) {
-  Path& path = paths_[index];
-  path.busy = {now + busy_memory, t_ms};
+  paths_[index].busy = {now + busy_memory, t_ms};
 }
 
 bool Paths::refuses(const Path& path, Time now) const {
@@ -305,15 +304,12 @@ bool Paths::refuses(const Path& path, Time now) const {
   return !comparable || newer(*path.busy.board_ms, own_->t_ms);
 }
 
-bool Paths::all_busy(Time now) const {
-  return std::all_of(paths_.begin(), paths_.end(),
-                     [&](const Path& path) { return refuses(path, now) || !is_heard(path, now); });
-}
-
-Time Paths::all_busy_until(Time now) const {
+std::optional<Time> Paths::all_busy_until(Time now) const {
   Time until = now + busy_memory;
   for (const Path& path : paths_) {
-    if (is_heard(path, now)) until = std::min(until, path.busy.until);
+    if (!is_heard(path, now)) continue;
+    if (!refuses(path, now)) return std::nullopt;
+    until = std::min(until, path.busy.until);
   }
   return until;
 }

@@ -93,9 +93,8 @@ class Paths {
   void on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now);
   // A state with the board's time `t_ms` names a command of this session, so an older BUSY is void.
   void on_own_state(std::uint32_t t_ms, Time now) { own_ = {now, t_ms}; }
-  // True if BUSY holds on all paths that carry.
-  bool all_busy(Time now) const;
-  Time all_busy_until(Time now) const;
+  // If BUSY holds on all paths that carry: until when. Empty if a path carries without BUSY.
+  std::optional<Time> all_busy_until(Time now) const;
 
   // --- a watcher's leases
 
@@ -170,8 +169,8 @@ class Paths {
   bool anew_ = true;  // no datagram has arrived since all paths were down
   Time first_answer_{0};
   std::uint32_t boot_ = 0;
-  Time proven_{0};   // the time of the last proof of the boot
-  PathClock clock_;  // from the newest T of all paths
+  Time proven_{0};                  // the time of the last proof of the boot
+  std::optional<PathClock> clock_;  // from the newest T of all paths
   struct OwnState {
     Time at{0};
     std::uint32_t t_ms = 0;

@@ -132,7 +132,7 @@ void Session::on_new_boot(Time now) {
   arming_.disarm(DisarmCause::restart);
   if (link_.wants_session()) {
     begin_session();
-    end_arming(Outcome::cancelled, now);
+    arming_.end(Outcome::cancelled, Refusal::none, now);
     commands_.give_up(now);
   }
   effects_.report(BoardRestarted{});
@@ -142,12 +142,7 @@ void Session::advance_arming(Time now) {
   if (arming_.take_abandoned()) commands_.remove_step();
   if (!arming_.any() || !keeper_.in_control(now) || commands_.delays_arming()) return;
   const std::optional<Command> step = arming_.next_step(link_.reason(), now);
-  if (step && !commands_.send_step(*step, now)) end_arming(Outcome::full, now);
-}
-
-void Session::end_arming(Outcome outcome, Time now) {
-  arming_.end(outcome, Refusal::none, now);
-  commands_.remove_step();
+  if (step && !commands_.send_step(*step, now)) arming_.end(Outcome::full, Refusal::none, now);
 }
 
 Ticket Session::arm(Time timeout, Time now) {
@@ -242,12 +237,12 @@ void Session::change_role(BoardRole role, Time now) {
 }
 
 void Session::end_all_but_stops(Outcome outcome, Time now) {
-  end_arming(outcome, now);
+  arming_.end(outcome, Refusal::none, now);
   commands_.end_all_but_stops(outcome, now);
 }
 
 void Session::end_all(Time now) {
-  end_arming(Outcome::closed, now);
+  arming_.end(Outcome::closed, Refusal::none, now);
   commands_.end_all(now);
 }
 

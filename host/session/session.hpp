@@ -130,7 +130,6 @@ class Session {
   PostResult gate_of_posts(CommandKind kind, Time now);
   void refresh(Time now);
   void advance_arming(Time now);
-  void end_arming(Outcome outcome, Time now);
   void end_all_but_stops(Outcome outcome, Time now);
   void take_step_end(Time now);
   void on_restart(Time now);
@@ -155,6 +154,13 @@ class Session {
   Posts posts_;
   LinkStatus status_;
 };
+
+// True if the board is ready for commands or, for a watcher, heard: what wait_active() waits for.
+// The watchdog and a hanging callback also end `in_control`.
+inline bool is_ready(BoardRole role, const LinkStatus& link) {
+  return role == BoardRole::watch ? is_heard(link.state)
+                                  : link.state == HostLinkState::active && link.in_control;
+}
 
 // Posts a command or a group. For a board without groups, the commands are posted one after the
 // other, up to the first that is not sent. send_all() sends the effects, and may advance `now`.

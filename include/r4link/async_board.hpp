@@ -304,10 +304,7 @@ class AsyncBoard {
   void require_role_settled(std::string_view what) const;
   void start_release_control(Duration timeout, CompletionPtr completion);
 
-  class TimingSteps;
-  class TransferSteps;
   class AttachSteps;
-  class Farewell;
   std::shared_ptr<Impl> impl_;
 };
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The watchers' leases, up to four (docs/reference/protocol.md "Watching").
+// The watchers' leases at a board or bridge, up to four (docs/reference/protocol.md "Watching").
 //     free --W:rate that echoes its token--> watching --lease_ms without one, or W:0--> free
 //       |  ^                                   |  ^
 //       +--+ any other W: send a token         +--+ W:rate that echoes the token: renewed
 //
 // The board streams to a source only after the source has echoed a random token, so a forged source
 // cannot make the board flood another device. The board's clock cannot be the token, because any
-// peer can get the time. Answers with a token are limited. Times are the board's ms, and wrap.
+// peer can get the time. Answers with a token are limited. Times are in ms, and wrap.
 #pragma once
 
 #include <cstdint>

@@ -135,7 +135,7 @@ class Holder final : private ShareHolder::Owner {
   void hear() {
     std::array<char, ShareMessage::max_size + 1> packet;
     while (true) {
-      const ssize_t size = receive_packet(watcher_.get(), packet.data(), packet.size());
+      const ssize_t size = ::recv(watcher_.get(), packet.data(), packet.size(), MSG_TRUNC);
       if (size <= 0) break;
       const auto message = read_share_message({packet.data(), static_cast<std::size_t>(size)});
       require(message &&

@@ -55,14 +55,12 @@ void ShareClient::receive() {
 
 void ShareClient::expect_answer() {
   timer_.expires_after(answer_within);
-  timer_.async_wait(answering_.handler([this] { look_for_answer(); }));
-}
-
-void ShareClient::look_for_answer() {
-  expect_answer();
-  if (silence_ == 2) return owner_.on_no_help(silence());
-  if (silence_++ == 0) return;
-  send_message(connection_.native_handle(), ShareMessage::Kind::hello, ShareMessage::version);
+  timer_.async_wait(answering_.handler([this] {
+    expect_answer();
+    if (silence_ == 2) return owner_.on_no_help(silence());
+    if (silence_++ == 0) return;
+    send_message(connection_.native_handle(), ShareMessage::Kind::hello, ShareMessage::version);
+  }));
 }
 
 Problem ShareClient::silence() const {

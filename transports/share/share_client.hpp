@@ -54,7 +54,6 @@ class ShareClient {
   void listen();
   void receive();
   void expect_answer();
-  void look_for_answer();
 
   Owner& owner_;
   LoopDescriptor connection_;
@@ -62,7 +61,7 @@ class ShareClient {
   LoopTimer timer_;
   OperationSlot answering_;
   pid_t process_ = 0;
-  // 0: heard since the last look_for_answer(); 1: not heard; 2: not heard, and asked.
+  // 0: heard since the last expect_answer(); 1: not heard; 2: not heard, and asked.
   int silence_ = 0;
 };
 

@@ -123,8 +123,4 @@ int send_message(int connection, ShareMessage::Kind kind, std::string_view text)
   return ::sendmsg(connection, &message, MSG_NOSIGNAL) < 0 ? errno : 0;
 }
 
-ssize_t receive_packet(int connection, char* out, std::size_t size) {
-  return ::recv(connection, out, size, MSG_TRUNC);
-}
-
 }  // namespace r4

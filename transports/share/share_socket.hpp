@@ -6,7 +6,7 @@
 // take a name, so both ends read the user at the other end from the kernel. No call blocks.
 #pragma once
 
-#include <sys/types.h>
+#include <sys/socket.h>
 
 #include <array>
 #include <cerrno>
@@ -42,8 +42,6 @@ bool is_stopped(pid_t process);
 
 // 0, or errno.
 int send_message(int connection, ShareMessage::Kind kind, std::string_view text);
-// The packet's size, larger than `size` if it was cut; 0 if disconnected; -1 with errno.
-ssize_t receive_packet(int connection, char* out, std::size_t size);
 
 enum class Received { all, more, end };
 // Passes up to `most` messages to `on_message`, an invalid message as none. `end`: disconnected.
@@ -52,7 +50,8 @@ template <class OnMessage>
 Received receive_messages(LoopDescriptor& connection, int most, OnMessage on_message) {
   std::array<char, ShareMessage::max_size + 1> packet;
   for (int i = 0; i < most && connection.is_open(); ++i) {
-    const ssize_t size = receive_packet(connection.native_handle(), packet.data(), packet.size());
+    const ssize_t size =
+        ::recv(connection.native_handle(), packet.data(), packet.size(), MSG_TRUNC);
     if (size < 0 && would_block(errno)) return Received::all;
     // The other program ended without reading all messages. Its own messages can be read.
     if (size < 0 && errno == ECONNRESET) continue;

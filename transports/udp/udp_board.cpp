@@ -3,9 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 #include "network/packet_address.hpp"
+#include "search/host_lookup.hpp"
 
 namespace r4 {
 namespace {
@@ -14,27 +13,22 @@ constexpr int most_packets = 32;  // then other work of the loop runs
 
 }  // namespace
 
-UdpBoard::UdpBoard(asio::io_context& io, const Url& url, HostLookup lookup)
-    : UdpEnd(io, UdpUrl(url, Role::board)), lookup_(std::move(lookup)) {}
-
 void UdpBoard::open(Handler& handler) {
   close();
-  const Endpoint local(address_of(lookup_.find(url_.host), url_.host, url_.text), url_.port);
+  const Endpoint local(address_of(HostLookup().find(url_.host), url_.host, url_.text), url_.port);
   if (!url_.peer_host.empty()) find_peer(local);
   open_socket(local, false);
   asio::error_code error;
   socket_.bind(local, error);
   if (error) refuse(error, local, "end that program, or listen on another port");
-  at_all_addresses_ =
-      local.address().is_unspecified() && note_addresses(socket_.native_handle(), local.protocol());
-  sent_to_ = asio::ip::address();
+  if (local.address().is_unspecified()) note_addresses(socket_.native_handle(), local.protocol());
   name_ = fmt::format("udp://{}:{}", bracketed(url_.host), socket_.local_endpoint().port());
   if (!url_.peer.empty()) name_ += "?peer=" + url_.peer;
   begin(handler);
 }
 
 void UdpBoard::find_peer(const Endpoint& local) {
-  const FoundHost found = lookup_.find(url_.peer_host);
+  const FoundHost found = HostLookup().find(url_.peer_host);
   Endpoint host(address_of(found, url_.peer_host, url_.text), url_.peer_port);
   const bool v6_socket = local.protocol() == asio::ip::udp::v6();
   if (v6_socket && host.protocol() == asio::ip::udp::v4()) {
@@ -52,7 +46,6 @@ void UdpBoard::close() noexcept {
 }
 
 void UdpBoard::listen() {
-  if (!at_all_addresses_) return UdpEnd::listen();
   socket_.async_wait(UdpSocket::wait_read, reception_.handler([this] { take_what_is_there(); }));
 }
 

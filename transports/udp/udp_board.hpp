@@ -8,14 +8,13 @@
 
 #include "../board_end.hpp"
 #include "../framing/peer_table.hpp"
-#include "search/host_lookup.hpp"
 #include "udp_end.hpp"
 
 namespace r4 {
 
 class UdpBoard final : public UdpEnd, public BoardEnd {
  public:
-  UdpBoard(asio::io_context& io, const Url& url, HostLookup lookup);
+  UdpBoard(asio::io_context& io, const Url& url) : UdpEnd(io, UdpUrl(url, Role::board)) {}
   ~UdpBoard() override { close(); }
 
   void open(Handler& handler) override;
@@ -29,14 +28,12 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
   struct Place {
     Endpoint host;
     asio::ip::address at;
-    friend bool operator==(const Place& a, const Place& b) {
-      return a.host == b.host && a.at == b.at;
-    }
+    friend bool operator==(const Place&, const Place&) = default;
   };
 
   void listen() override;
   void take_what_is_there();
-  void received(std::string_view bytes) override;
+  void received(std::string_view bytes);
   SendResult transmit(std::string_view bytes, Peer to) override;
   int probe(const std::vector<OwnAddress>& own) override;
 
@@ -45,9 +42,7 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
 
   static constexpr int peer_places = 16;
 
-  const HostLookup lookup_;
   PeerTable<Place, peer_places> peers_;
-  bool at_all_addresses_ = false;
   asio::ip::address sent_to_;      // destination of the packet that is being read
   std::optional<Place> audience_;  // the destination of datagrams for everyone
 };

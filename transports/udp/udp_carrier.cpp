@@ -29,13 +29,8 @@ std::string spelling_of(const std::string& host) {
 
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role,
                                           Claim claim) {
-  return make_udp_carrier_with(io, url, role, HostLookup(), BoardSearch(), std::move(claim));
-}
-
-std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
-                                               HostLookup lookup, BoardSearch search, Claim claim) {
-  if (role == Role::board) return std::make_unique<UdpBoard>(io, url, std::move(lookup));
-  return std::make_unique<UdpHost>(io, url, std::move(lookup), std::move(search), std::move(claim));
+  if (role == Role::board) return std::make_unique<UdpBoard>(io, url);
+  return std::make_unique<UdpHost>(io, url, std::move(claim));
 }
 
 bool udp_has_own_port(const Url& text) { return UdpUrl(text, Role::host).listen == 0; }

@@ -24,18 +24,12 @@
 #include "../share_name.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/discovery/url.hpp"
-#include "search/board_search.hpp"
-#include "search/host_lookup.hpp"
 
 namespace r4 {
 
 // Throws Error{usage} for a wrong URL. A host that yields takes any port, if the URL has none.
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role,
                                           Claim claim);
-
-std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
-                                               HostLookup lookup, BoardSearch search = {},
-                                               Claim claim = std::make_shared<DeviceClaim>());
 
 // The name under which programs share the path: the board as in the URL, and the port of hosts.
 ShareName udp_share_name(const Url& text);

@@ -141,19 +141,6 @@ void UdpEnd::close() noexcept {
   close_socket();
 }
 
-// Asio first tries to receive at once. If Asio sets the sender, another packet has arrived.
-bool UdpEnd::begin_to_receive() {
-  sender_.port(0);
-  socket_.async_receive_from(asio::buffer(received_), sender_, MSG_TRUNC,
-                             reception_.handler([this](asio::error_code error, std::size_t size) {
-                               if (!error) received({received_.data(), size});
-                               if (handler_ == nullptr) return;
-                               const bool more = begin_to_receive();
-                               if (!more) handler_->on_drained();
-                             }));
-  return sender_.port() != 0;
-}
-
 void UdpEnd::hand_over(std::string_view bytes, Peer from) {
   ++counters_.rx_datagrams;
   counters_.rx_bytes += bytes.size();

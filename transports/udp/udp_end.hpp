@@ -34,13 +34,12 @@ class UdpEnd : public Carrier {
 
   UdpEnd(asio::io_context& io, UdpUrl url);
 
-  virtual void received(std::string_view bytes) = 0;
   // `full`: the socket takes no packet now.
   virtual SendResult transmit(std::string_view bytes, Peer to) = 0;
   // 0 if the network is up, else errno.
   virtual int probe(const std::vector<OwnAddress>& own) = 0;
   virtual void close_socket() noexcept;
-  virtual void listen() { begin_to_receive(); }
+  virtual void listen() = 0;
 
   // Opens the socket without binding it. Throws Error.
   void open_socket(const Endpoint& local, bool v6_only);
@@ -76,8 +75,6 @@ class UdpEnd : public Carrier {
   std::array<char, max_datagram> received_;
 
  private:
-  // True if another packet already waits.
-  bool begin_to_receive();
   void send_waiting();
   void lose_network(int error);
   void report_later();

@@ -2,14 +2,15 @@
 #include "udp_host.hpp"
 
 #include <fmt/format.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <utility>
 
 namespace r4 {
 
-UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search,
-                 Claim claim)
+UdpHost::UdpHost(asio::io_context& io, const Url& url, Claim claim, HostLookup lookup,
+                 BoardSearch search)
     : UdpEnd(io, UdpUrl(url, Role::host)),
       lookup_(std::move(lookup)),
       search_(std::move(search)),
@@ -121,13 +122,23 @@ void UdpHost::found(const FoundHost& answer) {
     return report();
   }
   wanted_.board_id = answer.board_id;
-  listen();
-  set_up(true);
-  if (is_open) {
+  begin(*handler_);
+  if (is_open && handler_ != nullptr) {
     warn(fmt::format("the board is at {} now; it was at {}", board_.address().to_string(), before),
          "");
   }
-  report();
+}
+
+// Asio first tries to receive at once. If Asio sets the sender, another packet has arrived.
+void UdpHost::listen() {
+  sender_.port(0);
+  socket_.async_receive_from(asio::buffer(received_), sender_, MSG_TRUNC,
+                             reception_.handler([this](asio::error_code error, std::size_t size) {
+                               if (!error) received({received_.data(), size});
+                               if (handler_ == nullptr) return;
+                               listen();
+                               if (sender_.port() == 0) handler_->on_drained();
+                             }));
 }
 
 void UdpHost::received(std::string_view bytes) {

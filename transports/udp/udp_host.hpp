@@ -15,14 +15,16 @@ namespace r4 {
 
 class UdpHost final : public UdpEnd, private NetworkWatch::Member {
  public:
-  UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search, Claim claim);
+  UdpHost(asio::io_context& io, const Url& url, Claim claim, HostLookup lookup = {},
+          BoardSearch search = {});
   ~UdpHost() override { close(); }
 
   void open(Handler& handler) override;
   void close() noexcept override;
 
  private:
-  void received(std::string_view bytes) override;
+  void listen() override;
+  void received(std::string_view bytes);
   SendResult transmit(std::string_view bytes, Peer) override {
     return transmit_to(bytes, board_, true);
   }

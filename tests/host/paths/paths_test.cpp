@@ -257,14 +257,14 @@ TEST_F(OnePath, ANewBoardOnTheOnlyPathCountsAsARestart) {
 TEST_F(OnePath, BusyEndsWhenAStateNamesACommandOfThisSession) {
   heartbeat();
   paths.on_busy(0, board_t(), now);
-  EXPECT_TRUE(paths.all_busy(now));
+  EXPECT_TRUE(paths.all_busy_until(now).has_value());
   pass(10);
   paths.on_own_state(board_t(), now);
-  EXPECT_FALSE(paths.all_busy(now)) << "a state after BUSY proves control";
+  EXPECT_FALSE(paths.all_busy_until(now).has_value()) << "a state after BUSY proves control";
   paths.on_busy(0, {}, now);
-  EXPECT_TRUE(paths.all_busy(now)) << "the transport hears another host";
+  EXPECT_TRUE(paths.all_busy_until(now).has_value()) << "the transport hears another host";
   pass(300);
-  EXPECT_FALSE(paths.all_busy(now));
+  EXPECT_FALSE(paths.all_busy_until(now).has_value());
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include "../recorder.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/problems.hpp"
-#include "transports/udp/udp_carrier.hpp"
+#include "transports/udp/udp_host.hpp"
 
 namespace r4::test {
 namespace {
@@ -73,7 +73,7 @@ class UdpNameTest : public testing::Test {
   }
   std::unique_ptr<Carrier> make() {
     const Url url = Url::parse("udp://board.test:" + port + "?listen=0");
-    return make_udp_carrier_with(io, url, Role::host, lookup);
+    return std::make_unique<UdpHost>(io, url, std::make_shared<DeviceClaim>(), lookup);
   }
   void open_in_loop() {
     host = make();
@@ -213,7 +213,8 @@ TEST_F(UdpNameTest, AnAnswerAfterTheLoopIsDestroyedIsHarmless) {
   {
     asio::io_context own;
     const Url url = Url::parse("udp://board.test:" + port + "?listen=0");
-    const auto carrier = make_udp_carrier_with(own, url, Role::host, lookup);
+    const auto carrier =
+        std::make_unique<UdpHost>(own, url, std::make_shared<DeviceClaim>(), lookup);
     asio::post(own, [&] { carrier->open(at_host); });
     ASSERT_TRUE(run_until(own, [&] { return names.asked() == 1; }));
   }

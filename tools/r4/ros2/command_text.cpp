@@ -76,9 +76,15 @@ std::vector<OwnCommand> commands_of(std::string_view text) {
 }
 
 Problem for_a_node(Problem problem, DisarmCause cause) {
-  if (is_earlier(cause))
+  if (is_earlier(cause)) {
     problem.fix =
         "clear the cause on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm";
+  }
+  constexpr std::string_view program("call arm()");
+  const std::size_t at = problem.fix.find(program);
+  if (at != std::string::npos) {
+    problem.fix.replace(at, program.size(), "publish false and then true on arm");
+  }
   return problem;
 }
 

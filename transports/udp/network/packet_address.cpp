@@ -45,11 +45,11 @@ void put(msghdr& message, int level, int type, const Info& info) {
 
 }  // namespace
 
-bool note_addresses(int socket, const asio::ip::udp& protocol) {
+void note_addresses(int socket, const asio::ip::udp& protocol) {
   const bool v6 = protocol == asio::ip::udp::v6();
   const int yes = 1;
-  return ::setsockopt(socket, v6 ? static_cast<int>(IPPROTO_IPV6) : static_cast<int>(IPPROTO_IP),
-                      v6 ? IPV6_RECVPKTINFO : IP_PKTINFO, &yes, sizeof yes) == 0;
+  ::setsockopt(socket, v6 ? static_cast<int>(IPPROTO_IPV6) : static_cast<int>(IPPROTO_IP),
+               v6 ? IPV6_RECVPKTINFO : IP_PKTINFO, &yes, sizeof yes);
 }
 
 // NOLINTNEXTLINE(readability-non-const-parameter): the kernel writes to it

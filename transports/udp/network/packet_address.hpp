@@ -11,8 +11,8 @@
 
 namespace r4 {
 
-// Makes the kernel report the destination address of each packet. False if the kernel refuses.
-bool note_addresses(int socket, const asio::ip::udp& protocol);
+// Makes the kernel report the destination address of each packet.
+void note_addresses(int socket, const asio::ip::udp& protocol);
 
 // Takes the next packet. Returns its size, which may exceed `room`; none: no packet. Sets `at` to
 // its destination; unspecified if unknown or not of this computer (multicast).

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 
 #include "../../file_descriptor.hpp"
@@ -42,8 +43,19 @@ std::vector<OwnAddress> own_addresses() {
   for (const ifaddrs* each = all; each != nullptr; each = each->ifa_next) {
     const sockaddr* const at = each->ifa_addr;
     if (at == nullptr || (at->sa_family != AF_INET && at->sa_family != AF_INET6)) continue;
-    own.push_back({endpoint_of(*at).address(), ::if_nametoindex(each->ifa_name),
-                   (each->ifa_flags & IFF_UP) != 0 && (each->ifa_flags & IFF_RUNNING) != 0});
+    const auto is = [each](unsigned flag) { return (each->ifa_flags & flag) != 0; };
+    OwnAddress& one = own.emplace_back();
+    one.address = endpoint_of(*at).address();
+    one.name = each->ifa_name;
+    one.name.resize(std::min(one.name.size(), one.name.find(':')));  // without an alias
+    one.interface = ::if_nametoindex(one.name.c_str());
+    one.works = is(IFF_UP) && is(IFF_RUNNING);
+    if (one.address.is_v6()) continue;
+    if (is(IFF_LOOPBACK)) one.broadcast = one.address.to_v4();
+    if (is(IFF_LOOPBACK) || !is(IFF_BROADCAST) || each->ifa_netmask == nullptr) continue;
+    const std::uint32_t hosts = ~endpoint_of(*each->ifa_netmask).address().to_v4().to_uint();
+    if (hosts < 3) continue;  // one or two addresses: no broadcast
+    one.broadcast = asio::ip::address_v4(one.address.to_v4().to_uint() | hosts);
   }
   ::freeifaddrs(all);
   return own;

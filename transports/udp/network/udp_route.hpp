@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The route to a board: whether it exists, and whether its interface works. Sends nothing.
+// The own addresses, and the route to a board: whether it exists, and whether its interface works.
+// Sends nothing.
 #pragma once
 
 #include <asio/ip/address.hpp>
 #include <asio/ip/udp.hpp>
+#include <string>
 #include <vector>
 
 namespace r4 {
@@ -11,7 +13,10 @@ namespace r4 {
 struct OwnAddress {
   asio::ip::address address;
   unsigned interface = 0;
-  bool works = false;  // the interface is up and has a carrier (a plugged cable, a joined WiFi)
+  bool works = false;     // the interface is up and has a carrier (a plugged cable, a joined WiFi)
+  std::string name = {};  // of the interface
+  // Reaches the computers of its network; of the loopback: itself. Unspecified: none.
+  asio::ip::address_v4 broadcast = {};
 };
 // Empty if the system does not report its addresses.
 std::vector<OwnAddress> own_addresses();

@@ -2,8 +2,6 @@
 #include "board_search.hpp"
 
 #include <fmt/format.h>
-#include <ifaddrs.h>
-#include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -13,12 +11,12 @@
 #include <asio/ip/udp.hpp>
 #include <cerrno>
 #include <cstring>
-#include <memory>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "../../file_descriptor.hpp"
+#include "../network/udp_route.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/discovery/url.hpp"
 
@@ -34,12 +32,6 @@ constexpr std::size_t most_networks = 64;
 // Datagrams read from one socket before the next socket is read and the time checked.
 constexpr int most_at_once = 64;
 constexpr std::size_t most_listed = 8;  // boards in an error; `r4 list` shows all of them
-
-address_v4 address_of(const sockaddr* system) {
-  sockaddr_in in{};
-  std::memcpy(&in, system, sizeof in);
-  return address_v4(ntohl(in.sin_addr.s_addr));
-}
 
 // Sends by the network's own interface. If it is not open, `network.trouble` has the reason.
 FileDescriptor open_in(Network& network) {
@@ -140,15 +132,10 @@ class Round {
 
   // A simulated board that listens on all addresses of this computer answers from each address.
   void merge_own() {
-    std::vector<AnsweredBoard>& boards = result_.boards;
-    for (std::size_t i = 0; i < boards.size(); ++i) {
-      if (!is_own(boards[i].address)) continue;
-      const auto same = [&](const AnsweredBoard& other) {
-        return other.board_id == boards[i].board_id && is_own(other.address);
-      };
-      const auto after = boards.begin() + static_cast<std::ptrdiff_t>(i) + 1;
-      boards.erase(std::remove_if(after, boards.end(), same), boards.end());
-    }
+    std::set<std::string> kept;
+    std::erase_if(result_.boards, [&](const AnsweredBoard& board) {
+      return is_own(board.address) && !kept.insert(board.board_id).second;
+    });
   }
 
   const BoardSearch& search_;
@@ -201,27 +188,9 @@ Problem several_found(const std::vector<AnsweredBoard>& boards, const WantedBoar
 
 std::vector<Network> BoardSearch::networks_of_this_computer() {
   std::vector<Network> networks;
-  ifaddrs* first = nullptr;
-  if (::getifaddrs(&first) != 0) return networks;
-  const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> all(first, &::freeifaddrs);
-  for (const ifaddrs* each = first; each != nullptr; each = each->ifa_next) {
-    const bool is_running = (each->ifa_flags & IFF_UP) != 0 && (each->ifa_flags & IFF_RUNNING) != 0;
-    if (each->ifa_addr == nullptr || each->ifa_addr->sa_family != AF_INET || !is_running) continue;
-    Network network;
-    network.interface = each->ifa_name;
-    network.interface.resize(std::min(network.interface.size(), network.interface.find(':')));
-    network.index = ::if_nametoindex(network.interface.c_str());
-    network.from = address_of(each->ifa_addr);
-    if ((each->ifa_flags & IFF_LOOPBACK) != 0) {
-      network.to = network.from;
-    } else {
-      if ((each->ifa_flags & IFF_BROADCAST) == 0 || each->ifa_netmask == nullptr) continue;
-      const std::uint32_t hosts = ~address_of(each->ifa_netmask).to_uint();
-      if (hosts < 3) continue;  // one or two addresses: no broadcast
-      network.to = address_v4(network.from.to_uint() | hosts);
-    }
-    networks.push_back(std::move(network));
-    if (networks.size() == most_networks) break;
+  for (OwnAddress& own : own_addresses()) {
+    if (!own.works || own.broadcast.is_unspecified() || networks.size() == most_networks) continue;
+    networks.push_back({std::move(own.name), own.interface, own.address.to_v4(), own.broadcast});
   }
   return networks;
 }

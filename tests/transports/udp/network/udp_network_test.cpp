@@ -18,7 +18,7 @@
 #include "../../recorder.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/file_descriptor.hpp"
-#include "transports/udp/udp_carrier.hpp"
+#include "transports/udp/udp_host.hpp"
 
 namespace r4::test {
 namespace {
@@ -167,8 +167,8 @@ int follow_the_board_out_of_a_lost_network() {
   };
   lookup.retry = lookup.silence = std::chrono::milliseconds{10};
   const auto board = open_carrier(io, "udp://127.0.0.1:20180", Role::board, at_board);
-  const auto host =
-      make_udp_carrier_with(io, Url::parse("udp://board.test:20180"), Role::host, lookup);
+  const std::unique_ptr<Carrier> host = std::make_unique<UdpHost>(
+      io, Url::parse("udp://board.test:20180"), std::make_shared<DeviceClaim>(), lookup);
   host->open(at_host);
   if (!set_second(false)) return 11;
   if (!run_until(io, [&] { return at_host.count(Kind::down) == 1; })) return 12;

@@ -7,7 +7,7 @@
 #include "../../recorder.hpp"
 #include "answering_boards.hpp"
 #include "tests/support/problems.hpp"
-#include "transports/udp/udp_carrier.hpp"
+#include "transports/udp/udp_host.hpp"
 
 namespace r4::test {
 namespace {
@@ -32,7 +32,8 @@ class UdpSearchTest : public testing::Test {
     search.networks = [networks] { return networks; };
     const std::string options = (url.find('?') == std::string::npos ? "?" : "&") +
                                 std::string("listen=0&port=") + std::to_string(boards.port());
-    host = make_udp_carrier_with(io, Url::parse(url + options), Role::host, lookup, search);
+    host = std::make_unique<UdpHost>(io, Url::parse(url + options), std::make_shared<DeviceClaim>(),
+                                     lookup, search);
   }
   void open_in_loop() {
     asio::post(io, [this] { host->open(at_host); });
