@@ -27,7 +27,7 @@ class Registry {
     CarrierFactory make;
     // The transport's name for sharing. Null: not shared. Throws Error if there is no transport.
     std::function<ShareName(const Url& url)> share_name = nullptr;
-    // True if the transport of this URL belongs to its program alone. Null: never.
+    // True if no other program can use the transport of this URL, so it is not shared. Null: never.
     std::function<bool(const Url& url)> own = nullptr;
   };
 

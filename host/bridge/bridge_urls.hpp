@@ -13,8 +13,8 @@ struct BridgedUrls {
   std::string board;
 };
 
-// Throws Error{usage} for patterns of different lengths, a side of several paths, a side joined to
-// itself, and a transport that cannot serve its side.
+// Throws Error{usage} for patterns that give different numbers of URLs, a side with several paths,
+// two equal sides, and a transport that cannot serve its side.
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board);
 
 // True if only programs of this computer, or devices plugged into it, reach the hosts' side.

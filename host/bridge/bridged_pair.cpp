@@ -172,7 +172,8 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
     return;
   }
   if (!trusted && !may_ask(now)) return;
-  // The answer has SESSION, so it proves that the command is not executed. No duplicate has passed.
+  // The answer has SESSION, so it proves that the board does not execute the command: the
+  // bridge passes no site setting to the board.
   if (has_site_setting(datagram)) {
     ++hosts_.counters.refused;
     return answer(datagram, Refusal::auth, 0, from, now, known_.first_heartbeat(from, sid));

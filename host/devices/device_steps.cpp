@@ -39,7 +39,8 @@ std::vector<DeviceStep> steps_of(const Device& device) {
     add(CommandKind::i2c_write, write.bytes).wait = write.wait;
     if (&write != &description.writes.front()) continue;
     // Empties the slots until the set-up ends, because a reading during the set-up is not a
-    // measurement. The confirmed first write shows that the device may be set up.
+    // measurement. Follows the first write, because its confirmation proves that the
+    // board accepts the set-up.
     for (int slot = device.first_slot(); slot <= device.last_slot(); ++slot) {
       add(CommandKind::i2c_poll, {}).slot = slot;
     }

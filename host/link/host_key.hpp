@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's key, and whether the board accepts it.
 // With a key, every datagram is signed as soon as the board's nonce is known. A board without a
-// nonce has no key and obeys any host, so a host with a key refuses the board. A board that rejects
-// this host's key, or a host without a key, accepts no heartbeats or answers AUTH.
+// nonce has no key and obeys any host, so a host with a key refuses the board. If the board rejects
+// this host's key, or requires a key that this host lacks, the board accepts no heartbeats or
+// answers AUTH.
 #pragma once
 
 #include <chrono>

@@ -23,7 +23,7 @@ namespace r4 {
 class IdentityQuestion {
  public:
   void asked(std::uint32_t pnum, Time now) {
-    // A repetition keeps the time of the first sending, because the answer may be to the first.
+    // Keeps the time of the first sending, because the board may have answered the first sending.
     const auto same = [pnum](const Asked& each) { return each.open && each.pnum == pnum; };
     if (std::any_of(open_.begin(), open_.end(), same)) return;
     open_[count_++ % open_.size()] = {pnum, now, true};

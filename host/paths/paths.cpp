@@ -90,7 +90,7 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   Path& path = paths_[index];
   if (!path.up) return Admission::no;
   const std::optional<Time> asked = path.questions.open.answered(identity);
-  // An answer to another program, or a duplicate, does not prove the boot.
+  // An answer to another program, or a duplicate, does not prove whether the board has restarted.
   if (!asked && path.can_ask) return path.known ? Admission::yes : Admission::no;
   const std::string_view id(identity.board_id.data(), identity.board_id.size());
   if (path.board_id != id) path.board_id = id;

@@ -80,7 +80,8 @@ class Session {
   Ticket arm(Time timeout, Time now);
   // Ends heartbeats and all commands except stops, and sends the farewell: the outputs are safe at
   // once, and another host need not wait for the timeout. The board's report confirms the farewell.
-  // Returns 0 without a link, or if the board lacks the farewell. Then only stops are sent.
+  // Returns 0 without a link, or if the board lacks the farewell. After leave(), only stops are
+  // sent.
   Ticket leave(Time timeout, Time now);
   bool leaving() const { return keeper_.is_leaving(); }
   // As leave(), but the commands end as cancelled, and change_role() may follow.

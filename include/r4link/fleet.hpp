@@ -67,7 +67,8 @@ class R4LINK_API FleetResults {
   explicit FleetResults(std::vector<FleetResult> results) : results_(std::move(results)) {}
   bool all_confirmed() const;
   std::vector<std::size_t> failed() const;  // the numbers of the boards
-  // If boards did not confirm, throws Error{refused} about the first, and counts further boards.
+  // If boards did not confirm, throws Error{refused} about the first unconfirmed board. The reason
+  // also gives the number of other unconfirmed boards.
   void require() const;
 
   std::size_t size() const { return results_.size(); }

@@ -290,7 +290,7 @@ void CanCarrier::arm() {
   IsotpDeadline deadline = node_.deadline();
   if (handler_ == nullptr || !deadline.armed) return;
   const std::uint32_t now_us = CanBus::now_us();
-  // A due frame waits until the bus has room. A later deadline may be a time-out.
+  // If the bus is full, a due frame waits for room. A later deadline is kept: it may be a time-out.
   if (bus_->full() && reached(now_us, deadline.at_us)) deadline.at_us = now_us + look_again_us;
   if (armed_ && reached(deadline.at_us, armed_for_us_)) return;
   armed_ = true;

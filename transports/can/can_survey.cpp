@@ -109,8 +109,7 @@ void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
     case MessageKind::board_heartbeat:
       ++board.heartbeats;
       board.reason = heartbeat_reason(datagram);
-      // Without a host all heartbeats are the same (docs/reference/protocol.md).
-      board.connected = datagram.pnum() != 0 || datagram.time_ms() != 0;
+      board.connected = !is_connecting_heartbeat(datagram);
       break;
     case MessageKind::nack:
     case MessageKind::identity:

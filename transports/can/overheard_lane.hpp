@@ -17,7 +17,8 @@ class OverheardLane {
   OverheardLane(CanIdKind kind, std::uint8_t node)
       : receiver_(listening_to(kind, node), bytes_.data(), max_datagram) {}
 
-  // The completed datagram in plain form, valid until the next call; empty: it cannot be unpacked.
+  // The completed datagram in plain form, valid until the next call. An empty Text: the datagram
+  // cannot be unpacked.
   std::optional<Text> on_frame(const CanFrame& frame, std::uint32_t at_us) {
     if (!receiver_.on_frame(frame, at_us).datagram) return std::nullopt;
     if (!is_packed(receiver_.data()[0])) return receiver_.text();

@@ -290,7 +290,8 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
     if (result == SendResult::sent) holder_.tell(Kind::sent, bytes);
     return result;
   }
-  // The holder sends only stops: the board would attribute other datagrams to the holder.
+  // For a served program, the holder sends only stops, because the board would attribute other
+  // datagrams to the holder.
   if (!is_served() || priority != Priority::stop) return SendResult::down;
   ++shared_counters_.tx_datagrams;
   shared_counters_.tx_bytes += bytes.size();

@@ -129,7 +129,8 @@ void UdpHost::found(const FoundHost& answer) {
   }
 }
 
-// Asio first tries to receive at once. If Asio sets the sender, another packet has arrived.
+// Asio first tries to receive at once. If Asio then sets the sender, the socket held another
+// packet, so the socket is not drained.
 void UdpHost::listen() {
   sender_.port(0);
   socket_.async_receive_from(asio::buffer(received_), sender_, MSG_TRUNC,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The socket with which a host hears one board. The boards of a program share the port of hosts.
-// The first socket has the port alone, so another program at that port is noticed. The first socket
-// receives from all ports of its board. A further socket is bound to the same port and connected,
+// Another program cannot share this port, so a conflict is noticed. The first socket receives from
+// all ports of its board. A further socket is bound to the same port and connected,
 // so it receives from its board's port only. A packet between bind and connect may be lost.
 #pragma once
 

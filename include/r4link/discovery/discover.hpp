@@ -94,8 +94,9 @@ struct Discovery {
   std::vector<SearchedNetwork> networks;
   bool more = false;  // more than `most_answers` boards have answered by UDP
 
-  // The only board. A board id on several transports is one board, with its first URL. Throws
-  // Error: open with the searched places for no board, usage with all URLs for several boards.
+  // The only board. A board id on several transports is one board, with its first URL. If no board
+  // was found, throws Error{open} with the searched places. If several boards were found, throws
+  // Error{usage} with all URLs.
   R4LINK_API FoundBoard only() const;
 };
 

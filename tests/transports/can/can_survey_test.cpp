@@ -73,6 +73,14 @@ TEST(CanSurvey, DistinguishesR4IdsFromThoseOfAnotherProtocol) {
   EXPECT_TRUE(bus.survey.is_r4(emergency_stop_id));
 }
 
+TEST(CanSurvey, ABoardWithAKeyAndWithoutAHostIsNotConnected) {
+  Bus bus;
+  bus.say(write_board_heartbeat(bus.bytes, sizeof bus.bytes, 0, 5000, SafeReason::link,
+                                "00112233aabbccdd"));
+  EXPECT_EQ(bus.survey.board(3).heartbeats, 1U);
+  EXPECT_FALSE(bus.survey.board(3).connected);
+}
+
 TEST(CanSurvey, HearsEveryDatagramOfABoard) {
   Bus bus;
   for (std::uint32_t pnum = 10; pnum < 30; ++pnum) bus.state(pnum);

@@ -142,7 +142,8 @@ class Port {
   // The USB path of the port's device, as dfu-util names it: "1-2". Empty: no USB port.
   std::string usb_path() const {
     std::error_code ignored;
-    const auto device = std::filesystem::canonical(path_, ignored);  // path_ may be a link
+    // path_ may be a symbolic link
+    const auto device = std::filesystem::canonical(path_, ignored);
     const auto name = device.filename();
     auto folder = std::filesystem::canonical("/sys/class/tty" / name / "device", ignored);
     while (folder.has_relative_path() && !std::filesystem::exists(folder / "idVendor")) {

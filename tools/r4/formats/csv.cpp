@@ -39,7 +39,7 @@ void append_cell(std::string& out, std::string_view others) {
   out += '"';
 }
 
-// Columns of devices; spreadsheets allow fewer.
+// Most columns for device values: further values get no column. Excel opens 16384 columns.
 constexpr std::size_t most_columns = 4096;
 
 }  // namespace

@@ -216,7 +216,8 @@ bool I2cController::recover() {
 
 // Drives the pins, because the peripheral does not drive a busy bus. Clocks SCL only while SDA is
 // held (UM10204 3.1.16), because a chip that was being written to would read a clock as a bit. If a
-// recovery interrupts this function, its rest is at most a START and a STOP on a free bus.
+// recovery interrupts this function, the remaining steps of this function send at most a START and
+// a STOP on a free bus.
 bool I2cController::free_lines() {
   registers_.CR1 = 0;
   giga::write(scl_, true);

@@ -9,14 +9,15 @@
 //                 missing handle or relay does not interrupt the supply.
 //     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty;
 //                 the index line is high for one of the 1000 counts of a turn, count 0
-//     DHB1A       the steering motor; AINSTEER is its position: 1 V, where forward ends, to 4 V,
-//                 1.5 s from end to end at full duty
+//     DHB1A       the steering motor; AINSTEER is its position: 1 V at the forward end, 4 V at the
+//                 reverse end, 1.5 s from end to end at full duty
 //     battery     AIN24 sags with the current of the OSMC motors (20 mOhm)
 //     US 1-4      ultrasonic sensors without an obstacle
 //     steppers    a motor each that takes a step at each pulse
 //
 // Settings do not change the model's wiring. An unconnected pin reads low, or high with a pull-up.
-// Analog inputs take the capture's values as often as it has them, chosen by seed and time only.
+// An analog input takes each value of the capture as often as the capture has that value. Only the
+// seed and the time choose the value.
 #pragma once
 
 #include <cstdint>
@@ -162,7 +163,7 @@ class BoardModel {
   UserDevices devices_;
   Stepper steppers_[stepper_channels];
   Shaft shafts_[encoder_channels];
-  std::int32_t steering_ = 0;  // position from the end of forward
+  std::int32_t steering_ = 0;  // position, from 0 at the forward end to steering_range
   UltrasonicModel sensors_[ultrasonic_channels];
   bool handle_held_ = true;
   // The levels of the signals that end at a pin of the Giga; levels of outputs are not used.
