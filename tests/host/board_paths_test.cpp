@@ -92,8 +92,8 @@ TEST(BoardPaths, AreRefusedIfTheyCannotLeadToOneBoard) {
   EXPECT_TRUE(contains(refusal({"can://can0", "serial:auto", "can://can0?node=1&fd=1"}), "twice"));
   EXPECT_TRUE(
       contains(refusal({"serial:///dev/../dev/ttyACM0", "serial:///dev/ttyACM0"}), "twice"));
-  EXPECT_TRUE(contains(refusal({"sim:", "udp://r4.local"}), "of its own"));
-  EXPECT_TRUE(contains(refusal({"serial:auto", "sim:"}), "of its own"));
+  EXPECT_TRUE(contains(refusal({"sim:", "udp://r4.local"}), "a separate board"));
+  EXPECT_TRUE(contains(refusal({"serial:auto", "sim:"}), "a separate board"));
   EXPECT_TRUE(contains(refusal({"udp://r4.local", "tcp://r4.local"}), "no transport"));
   EXPECT_TRUE(contains(refusal({}), "0 paths"));
   EXPECT_TRUE(

@@ -45,7 +45,7 @@ TEST_F(BoardServo, RefusesDegreesOutsideItsCalibration) {
   board.servo(1).set(Microseconds(1200));
   EXPECT_EQ(problem_of([&] { board.servo(1).set(Degrees(30)); }).text(),
             "servo(1): the servo is not calibrated; call calibrate() first, with the pulse and the "
-            "angle at each end of its travel; or set a pulse in microseconds");
+            "angle at each end of the servo's travel; or set a pulse in microseconds");
   EXPECT_EQ(problem_of([&] { board.servo(1).post(Degrees(30)); }).kind, ErrorKind::usage);
   board.servo(1).calibrate(gripper);
   EXPECT_EQ(problem_of([&] { board.servo(1).set(Degrees(46)); }).kind, ErrorKind::usage);

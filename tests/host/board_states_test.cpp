@@ -127,7 +127,7 @@ TEST(BoardStates, ComeInOrderAndReportEachGapOnce) {
       } else if (gap > 0) {
         const Problem problem = problem_of([&] { queue.take(0ms); });
         ASSERT_EQ(problem.kind, ErrorKind::data) << seed;
-        EXPECT_TRUE(contains(problem.reason, std::to_string(room) + " waited"));
+        EXPECT_TRUE(contains(problem.reason, "the queue of " + std::to_string(room)));
         EXPECT_TRUE(contains(problem.reason, "the next " + std::to_string(gap)));
         gap = 0;
       } else {

@@ -100,7 +100,7 @@ TEST(Registry, RefusesAnInvalidUrlOfATransport) {
       {"udp://host?id=left", Role::host, "no option 'id'"},
       {"udp://host?port=2018", Role::host, "no option 'port'"},
       {"udp://host/path", Role::host, "the URL is not udp://HOST"},
-      {"udp://host:0", Role::host, "port 0"},
+      {"udp://host:0", Role::host, "0 is not a valid port"},
       {"udp://host?listen=65536", Role::host, "out of range"},
       {"udp://host?listen=any", Role::host, "not a whole number"},
       {"udp://host?peer=x", Role::host, "no option 'peer'"},

@@ -260,7 +260,7 @@ TEST(DeviceDescription, ReportsTheErrorInALine) {
            WrongText{4, "value v p 0 u8 unit V unit V\n", "a word is named twice"},
            WrongText{4, "value v p 0 u8 gain 3\n", "a word of the value is not known"},
            WrongText{4, "ready v 1\n", "a value of this name is not defined above"},
-           WrongText{4, "lookalike x00 x01\n", "it has 3 words"},
+           WrongText{4, "lookalike x00 x01\n", "the line has 3 words"},
            WrongText{4,
                      "lookalike x00 x01 a\x1b"
                      "b\n",
@@ -291,7 +291,7 @@ TEST(DeviceDescription, ReportsAnErrorWithItsLineNumber) {
            WrongText{11, nine, "the board repeats at most 8 readings"},
            WrongText{5, description_head + "value w p 0 u8\nvalue v p 0 u8 only w\n",
                      "a word is missing at the end of the line"},
-           WrongText{5, description_head + "value v p 0 u8\nready v 1 2\n", "it has 4 words"},
+           WrongText{5, description_head + "value v p 0 u8\nready v 1 2\n", "the line has 4 words"},
            WrongText{5, description_head + "value v p 0 u8\nready v x01\n",
                      "the number after ready is not a number"},
            WrongText{5, description_head + "value v p 0 u8\nvalue v p 1 u8\n",
@@ -349,14 +349,14 @@ TEST(Device, IsNamedWithItsAddressAndSlot) {
   const auto devices = Device::from({"mpu6050", "ina219@0x41", "as5600@0x36:5", "bno055@0x28:7"});
   EXPECT_EQ(devices[1].fields(), "I2C3,I2C4");
   EXPECT_EQ(usage_of({"bno055@0x28:8"}),
-            "bno055@0x28: it takes 2 slots from slot 8 on, and the board has 8");
+            "bno055@0x28: the device needs 2 slots from slot 8 on, and the board has 8 slots");
   EXPECT_EQ(usage_of({"bno055@0x28:0"}),
-            "bno055@0x28: it takes 2 slots from slot 0 on, and the board has 8");
+            "bno055@0x28: the device needs 2 slots from slot 0 on, and the board has 8 slots");
   EXPECT_EQ(usage_of({"bno055@0x30"}), "bno055@0x30: the device cannot have this address");
   EXPECT_EQ(usage_of({"bno055@"}), "bno055@: the address or slot is not a number");
   EXPECT_EQ(usage_of({"bno055@0x28:"}), "bno055@0x28:: the address or slot is not a number");
   EXPECT_EQ(usage_of({"mpu6050@0x68:2", "bno055@0x28:1"}),
-            "bno055@0x28: mpu6050@0x68 has slot 2, too");
+            "bno055@0x28: mpu6050@0x68 also has slot 2");
   EXPECT_EQ(usage_of({"mpu6050@0x68", "icm20948@0x68"}),
             "icm20948@0x68: mpu6050@0x68 has the same address");
   EXPECT_THROW(Device::from("ina219", std::numeric_limits<int>::max()), Error);

@@ -87,7 +87,7 @@ TEST(WiringFile, NamesLineSignalReasonAndFix) {
   expect_error("r4-wiring 1\nhandle 1 = D42\n",
                "robot.wiring:2: ", "handle 1: is not a valid signal");
   expect_error("r4-wiring 1\nhandle = D42\n", "robot.wiring: ", "'chip bus' is missing");
-  expect_error(plan + "handle = none\n", "robot.wiring:", "handle has a place in line");
+  expect_error(plan + "handle = none\n", "robot.wiring:", "handle already has a place in line");
   expect_error(edited("handle = D42", "handle = D103"), at("handle = "),
                "handle: 'D103' is not a valid place: expected a pin, D0 to D102");
   expect_error(edited("handle = D42", "handle = D42 high"), at("handle = "), "expected 'low'");
@@ -106,7 +106,7 @@ TEST(WiringFile, NamesLineSignalReasonAndFix) {
   expect_error(edited("stepper 2 direction = D36", "stepper 2 direction = none"),
                at("stepper 2 step"), "is connected, but stepper 2 direction is not");
   expect_error(edited("osmc 1 pwm = osmc.0", "osmc 1 pwm = dhb12.15"), at("osmc 1 pwm"),
-               "another chip than osmc 1 direction, osmc.1");
+               "osmc 1 direction, osmc.1, are on different chips");
   expect_error(edited("analog 6 = A5", "analog 6 = D47"), at("analog 6"), "A0 to A7");
   expect_error(edited("chip osmc = 0x40", "chip osmc = 0x70"), at("chip osmc"), "without 0x70");
   expect_error(edited("chip bus = D20/D21", "chip bus = none"), at("chip bus"), "SDA1/SCL1");

@@ -142,7 +142,7 @@ TEST(Pcap, RefusesACaptureWithoutABoardAndNamesItsContents) {
   };
   const std::string state = captured_state();
   const std::string elsewhere = problem(pcap(ByteOrder::little, 228, ipv4(udp(3018, 2390, state))));
-  EXPECT_TRUE(contains(elsewhere, "port 2018, but of: 3018, 2390")) << elsewhere;
+  EXPECT_TRUE(contains(elsewhere, "port 2018, but: 3018, 2390")) << elsewhere;
   EXPECT_TRUE(contains(elsewhere, "--port"));
   const std::string unread = problem(pcap(ByteOrder::little, 127, std::string(100, 'r')));
   EXPECT_TRUE(contains(unread, "link types that r4 does not read: 127 (802.11")) << unread;

@@ -275,7 +275,7 @@ TEST_F(UdpCarrierTest, SaysWhyItCannotBeOpened) {
            Case{"udp://127.0.0.1?listen=" + other.port(), Role::host, in_use, "?listen=0"},
            Case{"udp://0.0.0.0:" + other.port(), Role::board, in_use, "another port"},
            Case{"udp://no-such-board.invalid?listen=0", Role::host,
-                "no host 'no-such-board.invalid'", "check the name"},
+                "the host 'no-such-board.invalid' was not found", "check the name"},
            Case{"udp://192.0.2.1:0", Role::board, "cannot be opened on 192.0.2.1", "0.0.0.0"},
            Case{"udp://127.0.0.1:20180?listen=0&local=10.254.77.9", Role::host,
                 "this computer does not have the address 10.254.77.9 at the moment", "ip address"},
