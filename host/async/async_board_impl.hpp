@@ -266,7 +266,7 @@ class AsyncBoard::Impl::Steps final : public Sequence {
  public:
   Steps(Impl& impl, CompletionPtr completion, Next next)
       : Sequence(impl, std::move(completion)), next_(std::move(next)) {}
-  void complete(const CommandResult& result, How how) override { next_(*this, result, how); }
+  void complete(const CommandResult& result, How called) override { next_(*this, result, called); }
 
  private:
   Next next_;
