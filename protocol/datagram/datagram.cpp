@@ -191,19 +191,13 @@ ReadResult read_datagram(Text bytes, Datagram& out) {
   }
 
   // Read in place, because copying a newly written datagram takes longer.
-  Datagram::Facts& facts = out.facts_;
-  facts = Datagram::Facts();
   const Text fields = between(whole.begin(), fields_end);
   std::uint64_t short_names[Datagram::words];
-  if (!mark_fields(fields, out.ends_, short_names)) {
-    return fail(ReadError::syntax, first_wrong_byte(fields));
-  }
-  facts.bytes = whole;
-  facts.fields = fields;
-  facts.checksum = crc;
-  const char* const wrong = out.read_short_names(short_names);
+  const bool valid = mark_fields(fields, out.ends_, short_names);
+  out.facts_ = {whole, fields, 0, no_session, crc, 0, false, false, 0, Field()};
+  const char* const wrong = valid ? out.read_short_names(short_names) : first_wrong_byte(fields);
   if (wrong == nullptr) return result;
-  facts = Datagram::Facts();
+  out.facts_ = Datagram::Facts();
   return fail(ReadError::syntax, wrong);
 }
 

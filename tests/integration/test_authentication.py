@@ -282,13 +282,13 @@ def test_a_key_file_of_another_user_is_a_permission_error():
 
 @pytest.mark.parametrize('arguments, code, words', [
     (['monitor', 'udp://127.0.0.1:9', '--key', ''], 2, '--key: does not name a file'),
-    (['monitor', 'udp://127.0.0.1:9', '--key', '/'], 4, '/: is a directory; name the file'),
+    (['monitor', 'udp://127.0.0.1:9', '--key', '/'], 4, '/: is a directory; give the file'),
     (['monitor', 'udp://127.0.0.1:9', '--key=~/.no-key'], 4, 'write $HOME/.no-key'),
     (['key', 'new', ''], 2, 'is not a file; name a file: r4 key new FILE'),
     (['key', 'new', 'serial:auto'], 2, 'is not a file; name a file: r4 key new FILE'),
     (['key', 'new', '/no-such-folder/key'], 4, 'a folder that you may write to'),
     (['key', 'new', 'key', '--id', '10'], 2, 'write 1 to 9'),
-    (['key', 'new', 'key', 'serial:auto'], 2, 'needs no board'),
+    (['key', 'new', 'key', 'serial:auto'], 2, 'is not needed for a new key'),
     (['key', 'give', 'serial:auto', 'key'], 2, 'is not a file; name a file: r4 key give FILE serial:auto'),
     (['key', 'give', 'key'], 2, 'URL: is missing'),
     (['key', 'give', 'key', 'serial:auto', '--id', '3'], 2, 'r4 key new FILE --id N'),

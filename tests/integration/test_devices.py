@@ -19,7 +19,7 @@ def test_send_scans_reads_and_writes_the_i2c_bus(board):
     lines = result.stdout.splitlines()
     assert [lines[1], lines[3], lines[6]] == ['  0x40 0x68', '  x68', '  x399f']
     missing = run('send', board.host_url, 'X:READ,0x50,x00,1')
-    assert missing.returncode == 3 and 'no acknowledge; X:SCAN shows which addresses answer' in missing.stderr
+    assert missing.returncode == 3 and 'no acknowledge; send X:SCAN to see which addresses answer' in missing.stderr
     answer = objects(run('send', board.host_url, 'X:READ,0x50,x00,1', '--json').stdout)[0]
     assert (answer['confirmed'], answer['transfer'], answer['bytes']) == (False, 'no acknowledge', 'x')
 
@@ -72,6 +72,6 @@ def test_a_stuck_i2c_bus_does_not_block_other_commands(tmp_path):
     scenario.write_text('0 userbus held\n')
     with Board('udp://127.0.0.1:0', options=('--script', str(scenario))) as board:
         stuck = run('send', board.host_url, 'X:READ,0x68,x75,1', 'R:1,On')
-        assert stuck.returncode == 3 and 'bus stuck; a device holds SDA or SCL' in stuck.stderr
+        assert stuck.returncode == 3 and 'bus stuck; find the device that holds SDA or SCL' in stuck.stderr
         assert run('send', board.host_url, 'R:1,On', 'O:358,1,1').returncode == 0
         assert run('stop', board.host_url).returncode == 0

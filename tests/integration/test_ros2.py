@@ -398,10 +398,10 @@ def test_two_nodes_with_one_name_warn_about_each_other():
         with Ros2(domain, other.host_url) as second:
             for here, there in ((first, second), (second, first)):
                 told = here.logged(f'process {there.process.pid} on ')
-                assert told['level'] == 'warning' and 'has a node /r4, too' in told['text']
+                assert told['level'] == 'warning' and 'also has a node /r4' in told['text']
                 assert '--namespace' in told['text']
             for _ in range(2):  # the two messages arrive in either order
-                assert peer.sample('rt/rosout', lambda data: b'has a node /r4, too' in data)[8] == 30
+                assert peer.sample('rt/rosout', lambda data: b'also has a node /r4' in data)[8] == 30
         with Ros2(domain, other.host_url, '--namespace', 'other') as third:
             third.logged('the board is connected')
             assert not any(' too: ' in each.get('text', '') for each in third.log)

@@ -115,7 +115,7 @@ def test_a_board_with_other_firmware_is_opened_at_1200_baud(place):
     (struct.pack('<II', 0x24080000, 0x080402c0), 'not a sketch'),
     (struct.pack('<II', 0x24080000, 0x08000001), 'not a sketch'),
     (struct.pack('<II', 0x30000000, 0x080402c1), 'not a sketch'),
-    (SKETCH + bytes(1966080), 'do not fit'),
+    (SKETCH + bytes(1966080), 'it is too large'),
 ], ids=['empty', 'short', 'zeros', 'even', 'boot-loader', 'no-ram', 'long'])
 def test_an_invalid_sketch_is_refused_before_the_board_is_stopped(place, content, reason):
     (place / 'sketch.bin').write_bytes(content)

@@ -136,7 +136,7 @@ def test_the_board_is_safe_at_once_when_the_browser_disconnects():
         took = board.state('SAFE', 'link')['came'] - gone
         print(f'safe {took * 1000:.1f} ms after the browser was killed')
         assert took < within(0.1)
-        assert 'gone' in other.next('control', lambda each: each['holder'] is None and each['why'])['why']
+        assert 'has disconnected' in other.next('control', lambda each: each['holder'] is None and each['why'])['why']
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGKILL])
