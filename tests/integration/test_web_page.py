@@ -284,7 +284,7 @@ def test_the_page_reports_a_lost_server_or_board_and_reconnects(browser):
                 page.until('document.querySelector("#alarm").hidden')
                 picture_moves(page)
                 web.process.kill()
-                assert 'Nothing here is live' in page.until_text('#alarm', 'The connection to r4 web is lost')
+                assert 'The values on this page are old' in page.until_text('#alarm', 'The connection to r4 web is lost')
                 assert page.text('.card .state strong') == 'Unknown'
                 seen = page.evaluate('r4_measured.states')
                 with Web(board.host_url, listen=f'127.0.0.1:{port}'):
