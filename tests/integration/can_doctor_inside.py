@@ -74,7 +74,7 @@ def test_doctor_fix_brings_a_virtual_bus_up():
     assert code == OPEN and found['can.down']['automatic']
     run('doctor', 'can://vcan0?node=1', '--fix', '--duration', '0.01', timeout=60)
     with Board('can://vcan0?node=1'):
-        _, found = doctor_that_finds('link', 'it answers in', 'can://vcan0?node=1')
+        _, found = doctor_that_finds('link', 'the board answers in', 'can://vcan0?node=1')
     assert found['link']['severity'] == 'ok', found
     assert found['can.load']['severity'] == 'ok' and found['can.interface']['reason'] == 'up, virtual'
 
