@@ -131,7 +131,7 @@ def test_a_stamped_cmd_vel_is_obeyed_unless_its_stamp_is_too_old():
         peer.writer('rt/cmd_vel', TWIST_STAMPED)
         ros2.logged('geometry_msgs/msg/TwistStamped, which is also accepted')
         again(lambda: peer.write('rt/cmd_vel', stamped(time.time() - 5, twist(2, 0))),
-              lambda timeout: ros2.logged('the stamp of its header is more than 1000 ms old', timeout=timeout))
+              lambda timeout: ros2.logged('the stamp of the header is more than 1000 ms old', timeout=timeout))
         for stamp, speed in ((time.time() + 60, 0.5), (0, 1.0)):
             _, outputs = drive(board, peer, 'rt/cmd_vel', stamped(stamp, twist(speed, 0)),
                                lambda each, speed=speed: pwm(each, 1) == round(speed / 2 * 4095))
