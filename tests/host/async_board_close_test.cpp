@@ -40,36 +40,23 @@ struct AsyncBoardClose : testing::Test, OnALoop {
   std::optional<CommandResult> end;
 };
 
-TEST_F(AsyncBoardClose, IsConfirmedWhenTheBoardIsSafe) {
+TEST_F(AsyncBoardClose, EndsCallbacksAndCommandsBeforeItIsConfirmed) {
   drive();
-  EXPECT_EQ(close(1s), Outcome::confirmed);
-  EXPECT_TRUE(simulated.is_without_host());
-}
-
-TEST_F(AsyncBoardClose, EndsCallbacksAndRefusesCommandsAtOnce) {
-  drive();
+  std::optional<CommandResult> waits, late;
+  board->async_send(Command::servo(1, Microseconds(1500)), 3s,
+                    [&](const CommandResult& result) { waits = result; });
   board->on_state([](const State&, const Datagram&) { ADD_FAILURE() << "a state"; });
   board->on_link([](const LinkStatus&) { ADD_FAILURE() << "the link"; });
   board->on_board_heartbeat([](const Datagram&) { ADD_FAILURE() << "a heartbeat"; });
   board->async_close(1s, note());
-  std::optional<CommandResult> late;
   board->async_send(Command::osmc(1, Pwm(5), Direction::forward), 1s,
                     [&](const CommandResult& result) { late = result; });
   EXPECT_EQ(board->post(Command::osmc(1, Pwm(5), Direction::forward)), PostResult::no_link);
-  ASSERT_TRUE(run_until([&] { return end && late; }));
+  ASSERT_TRUE(run_until([&] { return end && waits && late; }));
+  EXPECT_EQ(end->outcome, Outcome::confirmed);
+  EXPECT_EQ(waits->outcome, Outcome::closed);
   EXPECT_EQ(late->outcome, Outcome::closed);
   EXPECT_TRUE(simulated.is_without_host());
-}
-
-TEST_F(AsyncBoardClose, EndsCommandsUnderWay) {
-  drive();
-  std::optional<CommandResult> waits;
-  board->async_send(Command::servo(1, Microseconds(1500)), 3s,
-                    [&](const CommandResult& result) { waits = result; });
-  board->async_close(1s, note());
-  ASSERT_TRUE(run_until([&] { return end && waits; }));
-  EXPECT_EQ(waits->outcome, Outcome::closed);
-  EXPECT_EQ(end->outcome, Outcome::confirmed);
 }
 
 TEST_F(AsyncBoardClose, TimesOutIfTheBoardIsSilent) {

@@ -68,19 +68,6 @@ TEST(BoardPaths, LeadToOneBoardOverUdpAndAPty) {
   EXPECT_EQ(board.link().reason, SafeReason::stop);
 }
 
-TEST(BoardPaths, TheErrorForTwoBoardsNamesBoth) {
-  BoardInAThread left(std::vector<std::string>{"udp"}, "", "left-board");
-  BoardInAThread right(std::vector<std::string>{"pty"}, "", "right-board");
-  Board board({left.url(), right.url()}, at_will());
-  const Problem problem = problem_of([&] { board.wait_active(); });
-  EXPECT_EQ(problem.kind, ErrorKind::refused);
-  EXPECT_TRUE(contains(problem.text(), "left-board"));
-  EXPECT_TRUE(contains(problem.text(), "right-board"));
-  problem_of([&] { board.send("O:1,1,1", 100ms); });
-  EXPECT_TRUE(left.executed().empty());
-  EXPECT_TRUE(right.executed().empty());
-}
-
 TEST(BoardPaths, AreRefusedIfTheyCannotLeadToOneBoard) {
   asio::io_context io;
   const auto refusal = [&](const std::vector<std::string>& urls) {
@@ -104,10 +91,6 @@ TEST(BoardPaths, AreRefusedIfTheyCannotLeadToOneBoard) {
 TEST(BoardPaths, ReopenAPathThatCouldNotBeOpened) {
   const std::string link = temporary_path("path-");
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
-  EXPECT_EQ(problem_of([&] {
-              Board({"serial://" + link, "serial://" + link + "2"});
-            }).kind,
-            ErrorKind::open);
   std::atomic<int> downs{0};
   BoardCallbacks callbacks;
   callbacks.on_event = [&](const CarrierEvent& event) {

@@ -2,9 +2,7 @@
 // r4::Board with simulated boards in real time: in process, over UDP and over a pty.
 #include "r4link/board.hpp"
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <future>
@@ -37,7 +35,6 @@ TEST_P(BoardOver, ConfirmsEveryCommandAfterItsExecution) {
   Board board(simulated.url(), at_will());
   board.wait_active();
   board.setting("rate", "1000");
-  board.fields("ALL");
   board.osmc(1).set_pwm(358, Direction::forward);
   board.osmc(4).set(-1);
   board.dhb12(2).set_pwm(100, Direction::forward);
@@ -54,13 +51,6 @@ TEST_P(BoardOver, ConfirmsEveryCommandAfterItsExecution) {
   board.stepper(1).zero();
   board.setting("recovery", "rearm");
   board.send("S:0,16");
-  const State state = board.next_state();
-  EXPECT_EQ(state.osmc(1), (Drive{358, Direction::forward}));
-  EXPECT_EQ(state.osmc(4), (Drive{4095, Direction::reverse}));
-  EXPECT_EQ(state.dhb12(2), (Drive{100, Direction::forward}));
-  EXPECT_EQ(state.relays, 0b100);
-  EXPECT_EQ(state.bldc(4), (Bldc{2000, Direction::forward, true}));
-  EXPECT_EQ(state.servo_us(16), 0);
   const std::vector<std::string> after_settings{
       "O:358,1,1",    "O:4095,0,4", "D:100,1,2",        "S:1500,16", "R:3,On",       "P:-5,20000,2",
       "B:2000,1,1,4", "D:1024,0,1", "O:7,0,2",          "B:8,0,1,1", "B:4095,0,1,2", "B:1024,0,0,3",
@@ -147,12 +137,7 @@ TEST_P(BoardOver, TheBoardIsSafeAndFreeWhenTheHostHasEnded) {
     board.setting("timeout", "10000");  // much longer than any wait below
     board.osmc(1).set_pwm(100, Direction::forward);
     board.close();
-    bool safe = false;
-    simulated.run([&](sim::SimulatedBoard& each) {
-      safe = each.application().state() == BoardState::safe &&
-             each.application().reason() == SafeReason::link;
-    });
-    EXPECT_TRUE(safe) << "the board must be safe before close() returns";
+    EXPECT_TRUE(simulated.is_without_host()) << "the board must be safe before close() returns";
   }
 }
 
@@ -199,25 +184,6 @@ TEST(Board, ErrorsNameTheReasonOfAnInactiveLink) {
   EXPECT_TRUE(contains(problem_of([&] { board.identify(30ms); }).reason, "not confirmed"));
   EXPECT_TRUE(contains(problem_of([&] { board.stop(30ms); }).reason, "not confirmed"));
   EXPECT_FALSE(board.post(Command::osmc(1, Pwm(1), Direction::forward)));
-}
-
-TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
-  BoardInAThread simulated("udp");
-  Board owner(simulated.url(), at_will());
-  owner.wait_active();
-  BoardOptions options = at_will();
-  options.session.stop_linger = 0ms;  // so that the owner can clear the stop at once
-  Board other(simulated.url(), options);
-  const Problem problem = problem_of([&] { other.osmc(1).set_pwm(1, Direction::forward, 300ms); });
-  EXPECT_EQ(problem.kind, ErrorKind::refused);
-  EXPECT_TRUE(contains(problem.reason, "another host controls the board"));
-  EXPECT_TRUE(other.link().causes.has(LinkCause::busy));
-
-  other.stop();
-  EXPECT_TRUE(hears_of(owner, SafeReason::stop));
-  owner.send(Command::clear());
-  owner.close();
-  ASSERT_NO_THROW(other.wait_active(5s)) << "control is free when the owner is silent";
 }
 
 TEST_F(DrivenBoard, PostsCommandsAndGroupsAndWaitsForStatesWithoutTheHeap) {
@@ -285,14 +251,6 @@ TEST_F(DrivenBoard, StopsWithoutWaiting) {
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
 }
 
-TEST(Board, IdentifiesTheBoard) {
-  Board board("sim:?node=3", at_will());
-  const BoardIdentity identity = board.identify();
-  EXPECT_EQ(identity.board_id, "sim-3");
-  EXPECT_EQ(identity.firmware, R4LINK_VERSION);
-  EXPECT_FALSE(identity.capabilities.empty());
-}
-
 TEST(Board, MeasuresTheLink) {
   Board board("sim:", at_will());
   board.wait_active();
@@ -346,22 +304,6 @@ TEST(Board, AStopCancelsTheCallsOfOtherThreads) {
 }
 
 // --- callbacks
-
-TEST(Board, CallsBackInAnotherThreadUntilTheSubscriptionEnds) {
-  Board board("sim:", at_will());
-  const First<std::thread::id> caller;
-  std::atomic<int> states{0};
-  Subscription subscription = board.on_state([&, caller](const State& state) {
-    EXPECT_TRUE(state.present.has(StateField::ain24));
-    ++states;
-    caller.set(std::this_thread::get_id());
-  });
-  EXPECT_NE(caller.get(), std::this_thread::get_id());
-  subscription.cancel();
-  const int seen = states;
-  for (int i = 0; i < 3; ++i) board.next_state();
-  EXPECT_EQ(states, seen) << "no state may come after the callback was ended";
-}
 
 TEST(Board, AllowsBlockingCallsInACallback) {
   Board board("sim:", at_will());

@@ -277,20 +277,25 @@ TEST(BoardCallbacks, AreCalledInSubscriptionOrderAndEndOneByOne) {
 // cancel() waits in another thread until a running callback has returned.
 TEST(BoardCallbacks, AreNotRunningAfterCancelHasReturned) {
   Board board("sim:");
-  std::promise<void> running;
+  std::promise<std::thread::id> running;
+  std::atomic<int> calls{0};
   std::atomic<bool> over{false};
-  Subscription subscription = board.on_state([&, first = true](const State&) mutable {
-    if (!first) return;
-    first = false;
-    running.set_value();
+  Subscription subscription = board.on_state([&](const State&) {
+    if (++calls > 1) return;
+    running.set_value(std::this_thread::get_id());
     board.next_state();
     board.next_state();
     over = true;
   });
-  ASSERT_EQ(running.get_future().wait_for(5s), std::future_status::ready);
+  auto caller = running.get_future();
+  ASSERT_EQ(caller.wait_for(5s), std::future_status::ready);
+  EXPECT_NE(caller.get(), std::this_thread::get_id());
   subscription.cancel();
   EXPECT_TRUE(over);
   subscription.cancel();
+  const int seen = calls;
+  for (int i = 0; i < 3; ++i) board.next_state();
+  EXPECT_EQ(calls, seen) << "no state may come after the callback was ended";
 }
 
 struct DrivenCallbacks : DrivenBoard {};

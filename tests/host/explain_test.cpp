@@ -47,16 +47,6 @@ TEST(LinkCauses, AreReadMostSevereFirst) {
                                           LinkCause::other_board}));
 }
 
-TEST(LinkCauses, CanBeSetAndCleared) {
-  LinkCauses causes;
-  for (const LinkCause cause : all_causes()) {
-    causes.set(cause);
-    EXPECT_TRUE(causes.has(cause)) << to_text(cause);
-    causes.set(cause, false);
-    EXPECT_TRUE(causes.empty()) << to_text(cause);
-  }
-}
-
 TEST(Explain, AWiringWithATroubleHasItsOwnFix) {
   std::set<std::string> fixes;
   for (const ChipTrouble trouble :

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Boards on transports that the program implements, whose calls may wait
-// (r4link/transports/own_transport.hpp).
+// (r4link/transports/own_transport.hpp), and on the carrier of docs/examples/own_transport.
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 
 #include <asio/executor_work_guard.hpp>
 #include <asio/io_context.hpp>
@@ -19,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "docs/examples/own_transport/socket_carrier.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/board_loop.hpp"
 #include "r4link/board.hpp"
@@ -26,6 +28,7 @@
 #include "r4link/transports/own_transport.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/first.hpp"
+#include "transports/file_descriptor.hpp"
 #include "transports/own/own_carriers.hpp"
 
 namespace r4::test {
@@ -81,14 +84,12 @@ struct Modem final : OwnTransport, End<OwnTransport::Received> {
   void open(OwnTransport::Received received) override { begin(std::move(received)); }
   void send(std::string_view datagram) override {
     may_throw();
-    ++sent;
     if (hold) return hold.wait(true);
     if (other != nullptr) other->hand_over(datagram);
   }
   void close() override { finish(); }
 
   std::atomic<bool> hold{false};
-  std::atomic<int> sent{0};
   Modem* other = nullptr;
 };
 
@@ -173,6 +174,26 @@ struct CanBench : Pair<Adapter> {
   }};
 };
 
+// The transport of docs/examples/own_transport.
+struct SocketBench {
+  SocketBench() {
+    int ends[2];
+    EXPECT_EQ(0, ::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends));
+    here.reset(ends[0]);
+    there.reset(ends[1]);
+    board.emplace([this](asio::io_context&, Loop& loop) { return carrier(loop, there); });
+  }
+  CarrierMaker host_end() {
+    return [this](Loop& loop) { return carrier(loop, here); };
+  }
+  static std::unique_ptr<Carrier> carrier(Loop& loop, const FileDescriptor& socket) {
+    return std::make_unique<SocketCarrier>(loop, socket.get());
+  }
+  FileDescriptor here;
+  FileDescriptor there;
+  std::optional<SimulatedEnd> board;
+};
+
 template <class Condition>
 bool comes(Condition condition) {
   const auto deadline = std::chrono::steady_clock::now() + seconds(5);
@@ -209,15 +230,20 @@ TEST(OwnTransports, AnErrorOfTheFirstOpenIsThrownByTheBoardConstructor) {
   EXPECT_EQ(modem->closings, 0);
 }
 
-TEST(OwnTransports, ATransportIsDownAfterItsSendThrewUntilItReopens) {
-  ModemBench bench;
-  const First<std::string> down;
+// The callbacks of a board that report to `down` why its transport is down.
+BoardCallbacks noting(const First<std::string>& down) {
   BoardCallbacks callbacks;
   callbacks.on_event = [down](const CarrierEvent& event) {
     if (event.kind == CarrierEvent::Kind::down) down.set(event.problem.reason);
   };
-  Board board(carrier_on(bench.here), at_will(), callbacks);
-  board.wait_active();
+  return callbacks;
+}
+
+template <class Bench>
+void expect_down_until_reopened(Bench& bench) {
+  const First<std::string> down;
+  Board board(carrier_on(bench.here), at_will(), noting(down));
+  board.wait_active(seconds(5));
   bench.here->opens = true;
   bench.here->fails = true;
   EXPECT_EQ(down.get(), "the modem is gone");
@@ -225,19 +251,19 @@ TEST(OwnTransports, ATransportIsDownAfterItsSendThrewUntilItReopens) {
   bench.here->fails = false;
   bench.here->opens = false;
   board.wait_active(seconds(5));
+  EXPECT_NO_THROW(board.send("O:358,1,1"));
   EXPECT_EQ(bench.here->openings, 2);
   EXPECT_EQ(bench.here->closings, 1);
 }
 
-TEST(OwnTransports, APathThatCannotBeOpenedAtFirstJoinsLater) {
+TEST(OwnTransports, ATransportIsDownAfterItsSendThrewUntilItReopens) {
   ModemBench bench;
-  const auto late = std::make_shared<Modem>();
-  late->opens = true;
-  Board board(std::vector{carrier_on(bench.here), carrier_on(late)}, at_will());
-  board.wait_active();
-  EXPECT_NO_THROW(board.send("O:358,1,1"));
-  late->opens = false;
-  EXPECT_TRUE(comes([&] { return late->sent > 0; }));
+  expect_down_until_reopened(bench);
+}
+
+TEST(OwnTransports, ACanBusIsDownAfterAFailureUntilItReopens) {
+  CanBench bench;
+  expect_down_until_reopened(bench);
 }
 
 // A carrier on a modem, whose loop the test runs.
@@ -252,13 +278,15 @@ struct HeardModem final : Carrier::Handler {
       return false;
     }
   }
-  template <class Condition>
-  bool polls_until(Condition condition) {
-    return comes([&] {
+  // Hands "new" over, and expects that the carrier delivers nothing else.
+  void expect_only_new() {
+    modem->hand_over("new");
+    EXPECT_TRUE(comes([&] {
       io.restart();
       io.poll();
-      return condition();
-    });
+      return !heard.empty() && heard.back() == "new";
+    }));
+    EXPECT_EQ(heard, std::vector<std::string>{"new"});
   }
 
   asio::io_context io;
@@ -276,9 +304,7 @@ TEST(OwnTransports, APathThatJoinsLaterDoesNotDeliverWhatWasReceivedBefore) {
   ASSERT_TRUE(comes([&] { return host.modem->openings == 1; }));
   host.modem->hand_over("old");
   ASSERT_TRUE(comes([&] { return host.carrier->up() || host.opens(); }));
-  host.modem->hand_over("new");
-  EXPECT_TRUE(host.polls_until([&] { return !host.heard.empty() && host.heard.back() == "new"; }));
-  EXPECT_EQ(host.heard, std::vector<std::string>{"new"});
+  host.expect_only_new();
 }
 
 TEST(OwnTransports, AReopenedTransportDeliversNothingOfTheEarlierOpening) {
@@ -288,9 +314,7 @@ TEST(OwnTransports, AReopenedTransportDeliversNothingOfTheEarlierOpening) {
   host.carrier->send("lost", Priority::normal);
   ASSERT_TRUE(comes([&] { return host.modem->openings == 2; }));
   host.modem->hand_over_late("old");
-  host.modem->hand_over("new");
-  EXPECT_TRUE(host.polls_until([&] { return !host.heard.empty() && host.heard.back() == "new"; }));
-  EXPECT_EQ(host.heard, std::vector<std::string>{"new"});
+  host.expect_only_new();
 }
 
 TEST(OwnTransports, ASendThatDoesNotReturnDoesNotBlockTheBoard) {
@@ -325,26 +349,6 @@ TEST(OwnTransports, ACanBusCarriesCommandsAndTheEmergencyStopOfANode) {
   }
 }
 
-TEST(OwnTransports, ACanBusIsDownAfterAFailureUntilItReopens) {
-  CanBench bench;
-  const First<std::string> down;
-  BoardCallbacks callbacks;
-  callbacks.on_event = [down](const CarrierEvent& event) {
-    if (event.kind == CarrierEvent::Kind::down) down.set(event.problem.reason);
-  };
-  Board board(carrier_on(bench.here), at_will(), callbacks);
-  board.wait_active(seconds(5));
-  bench.here->opens = true;
-  bench.here->fails = true;
-  EXPECT_EQ(down.get(), "the modem is gone");
-  ASSERT_TRUE(comes([&] { return board.link().state != HostLinkState::active; }));
-  bench.here->fails = false;
-  bench.here->opens = false;
-  board.wait_active(seconds(5));
-  EXPECT_NO_THROW(board.send("O:358,1,1"));
-  EXPECT_EQ(bench.here->openings, 2);
-}
-
 TEST(OwnTransports, RefuseTooLongACanFrameAndANodeOutOfRange) {
   CanBench bench;
   const Board board(carrier_on(bench.here), at_will());
@@ -352,6 +356,18 @@ TEST(OwnTransports, RefuseTooLongACanFrameAndANodeOutOfRange) {
   EXPECT_THROW(bench.here->hand_over(1U, false, false, std::string_view(nine)), Error);
   EXPECT_NO_THROW(bench.here->hand_over(1U, false, true, std::string_view(nine)));
   EXPECT_THROW(Board(carrier_on(std::make_shared<Adapter>(), {.node = 32})), Error);
+}
+
+TEST(OwnTransports, TheExampleCarriesCommandsAndStopsUntilTheOtherProgramCloses) {
+  SocketBench bench;
+  const First<std::string> down;
+  Board board(bench.host_end(), at_will(), noting(down));
+  board.wait_active();
+  EXPECT_EQ(board.name(), "radio");
+  EXPECT_NO_THROW(board.send("O:358,1,1"));
+  EXPECT_NO_THROW(board.stop());
+  bench.board.reset();
+  EXPECT_EQ(down.get(), "the other end was closed");
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <optional>
 #include <string>
 
 #include "r4link/board.hpp"
@@ -29,12 +28,9 @@ State await(Board& board, const std::function<bool(const State&)>& is_so) {
 
 SimulatedRobot::Look await(Board& board, const SimulatedRobot& robot,
                            const std::function<bool(const SimulatedRobot::Look&)>& is_so) {
-  for (int tries = 0; tries < 1000; ++tries) {
-    if (is_so(robot.look())) return robot.look();
-    board.next_state();
-  }
-  ADD_FAILURE() << "the robot never fulfilled the condition";
-  return robot.look();
+  SimulatedRobot::Look look;
+  await(board, [&](const State&) { return is_so(look = robot.look()); });
+  return look;
 }
 
 void drive(Board& board) {
@@ -90,21 +86,6 @@ TEST(SimulatedRobot, AcceptsARobotModelOfTheProgram) {
       board, [](const State& now) { return now.distance_cm(3) == 77 && now.encoder(4) < -10; });
   EXPECT_EQ(state.encoder(1), 0) << "this robot has no motor of the default bench";
   EXPECT_NEAR(state.volts(Analog::ainsteer), 4.0, 0.02);
-}
-
-TEST(SimulatedRobot, MakesObstaclesVoltagesAndFaults) {
-  SimulatedRobot robot;
-  Board board(robot.url());
-  board.wait_active();
-  board.fields("AIN24,US2");
-  robot.happen("analog AIN24 21.5");
-  robot.happen("us 2 15");
-  await(board, [](const State& state) {
-    return state.raw.analog_cv[static_cast<int>(Analog::ain24)] == 2150 &&
-           state.distance_cm(2) == 15;
-  });
-  robot.happen("chip dac off");
-  await(board, [](const State& state) { return state.safe == SafeReason::fault; });
 }
 
 TEST(SimulatedRobot, AStalledMotorDrawsItsFullCurrent) {

@@ -11,12 +11,13 @@
 #include <vector>
 
 #include "host/bridge/bridged_pair.hpp"
+#include "tests/support/carriers.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/board_end.hpp"
 
 namespace r4::test {
 
-class ScriptedCarrier final : public Carrier, public BoardEnd {
+class ScriptedCarrier final : public IdleCarrier, public BoardEnd {
  public:
   struct Sent {
     std::string text;
@@ -24,14 +25,12 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
     Peer to;
   };
 
-  explicit ScriptedCarrier(std::string name) : name_(std::move(name)) { also_held.reserve(100); }
+  ScriptedCarrier() { also_held.reserve(100); }
 
   void open(Handler& handler) override {
     if (absence) throw Error(*absence);
-    handler_ = &handler;
-    handler.on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+    IdleCarrier::open(handler);
   }
-  void close() noexcept override { handler_ = nullptr; }
   SendResult send(std::string_view bytes, Priority priority, Peer to) override {
     if (result == SendResult::sent && keeps) sent.push_back({std::string(bytes), priority, to});
     return result;
@@ -45,8 +44,6 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
   }
   bool reaches(Peer peer) const override { return peer == everyone || peer == held; }
   bool is_shared() const override { return shared; }
-  bool up() const override { return handler_ != nullptr; }
-  const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counted; }
 
   void say(const std::string& fields, Peer from = everyone) { say_bytes(with_crc(fields), from); }
@@ -54,9 +51,7 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
     handler_->on_datagram(bytes, from);
   }
   void drained() { handler_->on_drained(); }
-  void report(CarrierEvent::Kind kind) {
-    handler_->on_carrier_event({kind, Problem{ErrorKind::open, name_, "gone", ""}});
-  }
+  void report(CarrierEvent::Kind kind) { handler_->on_carrier_event({kind, {}}); }
   // The datagrams sent since the last call, without checksums. "@peer" follows a datagram that was
   // sent to one peer.
   std::vector<std::string> take() {
@@ -76,10 +71,6 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
   std::vector<Sent> sent;
   Peer held = everyone;
   std::vector<Peer> also_held;
-
- private:
-  const std::string name_;
-  Handler* handler_ = nullptr;
 };
 
 class ScriptedBridge {
@@ -91,8 +82,8 @@ class ScriptedBridge {
     BridgedPair::Setup setup;
     setup.keys = std::move(keys);
     setup.trusted = trusted;
-    auto a = std::make_unique<ScriptedCarrier>("udp:");
-    auto b = std::make_unique<ScriptedCarrier>("can:");
+    auto a = std::make_unique<ScriptedCarrier>();
+    auto b = std::make_unique<ScriptedCarrier>();
     hosts = a.get();
     board = b.get();
     setup.hosts = std::move(a);

@@ -38,8 +38,7 @@ TEST(CommandHelp, AllowsASecretOnlyOverACable) {
   }
   for (const char* url :
        {"udp://192.168.4.1", "can://can0?node=3", "UDP://192.168.4.1", "both:", ""}) {
-    EXPECT_NE(problem_of([&] { require_cable(url, secret); }).text().find("over USB only"),
-              std::string::npos);
+    EXPECT_TRUE(contains(problem_of([&] { require_cable(url, secret); }).text(), "over USB only"));
     EXPECT_NO_THROW(require_cable(url, Command::setting("rate", "100"))) << url;
   }
 }
@@ -106,16 +105,14 @@ TEST(CommandHelp, ShowsTheCommandThatAnInvalidTextBeginsWith) {
             "use X:DAC,channel,mV with channel 1-2, mV 0-3300");
   EXPECT_EQ(bad_command("E:GO", Refusal::unknown).fix, "use E:STOP, E:CLEAR[,cause], E:LEAVE");
   EXPECT_EQ(bad_command("E:STOP,1", Refusal::format).fix, "use E:STOP");
-  EXPECT_NE(bad_command("G:1", Refusal::unknown).fix.find("use one of O:pwm,dir,ch D:"),
-            std::string::npos);
+  EXPECT_TRUE(contains(bad_command("G:1", Refusal::unknown).fix, "use one of O:pwm,dir,ch D:"));
 }
 
 TEST(CommandHelp, ShowsTheFormOfACommandWithAnInvalidValue) {
   EXPECT_EQ(bad_command(Command::dac(3, Millivolts(1)), Refusal::channel).fix,
             "use X:DAC,channel,mV with channel 1-2, mV 0-3300");
   EXPECT_EQ(bad_command(Command::stop(), Refusal::format).fix, "use E:STOP");
-  EXPECT_NE(bad_command(Command::setting("rate", "0"), Refusal::range).fix.find("1-1000"),
-            std::string::npos);
+  EXPECT_TRUE(contains(bad_command(Command::setting("rate", "0"), Refusal::range).fix, "1-1000"));
   EXPECT_EQ(bad_command(Command::setting("password", "eeeeeeee"), Refusal::range).thing,
             "C:password,...");
 }

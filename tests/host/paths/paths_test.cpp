@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <string_view>
+
 namespace r4 {
 namespace {
 
@@ -34,8 +36,8 @@ struct OnePath : testing::Test {
   bool booting() { return paths.admit_connecting(0, now); }
   void pass(int ms) { now += std::chrono::milliseconds{ms}; }
   void ask() { paths.asked(0, ++question, true, now); }
-  Admission answer() {
-    Identity identity{Text("0.1.0"), Text("board"), Text("udp")};
+  Admission answer(std::string_view board_id = "board") {
+    Identity identity{Text("0.1.0"), Text(board_id), Text("udp")};
     identity.has_asked = true;
     identity.asked = question;
     return paths.admit_identity(0, identity, board_t(), now);
@@ -53,6 +55,15 @@ struct OnePath : testing::Test {
   std::uint32_t question = 100;
 };
 
+// The board has sent a heartbeat, and has answered a question.
+struct AnsweredPath : OnePath {
+  AnsweredPath() {
+    heartbeat();
+    ask();
+    EXPECT_EQ(answer(), Admission::yes);
+  }
+};
+
 TEST_F(OnePath, SendsAsSoonAsTheTransportIsUp) {
   EXPECT_EQ(paths.speaking(), 1);
   EXPECT_EQ(paths.to_ask(now), 0) << "there is no other path whose board to compare";
@@ -61,18 +72,14 @@ TEST_F(OnePath, SendsAsSoonAsTheTransportIsUp) {
   EXPECT_TRUE(paths.all_down());
 }
 
-TEST_F(OnePath, PacketNumbersOrderHeartbeatsOfOneMillisecond) {
+TEST_F(OnePath, OlderDatagramsAndDuplicatesAreDropped) {
   EXPECT_TRUE(heartbeat());
-  EXPECT_TRUE(heartbeat());
+  EXPECT_TRUE(heartbeat()) << "packet numbers order the heartbeats of one millisecond";
   EXPECT_FALSE(heartbeat(board_t(), board_pnum - 1)) << "the same heartbeat again";
   EXPECT_FALSE(heartbeat(board_t(), board_pnum - 2)) << "a late heartbeat";
-}
-
-TEST_F(OnePath, OlderDatagramsAndDuplicatesAreDropped) {
   pass(100);
   ASSERT_TRUE(heartbeat(board_t(), 10));
   EXPECT_FALSE(heartbeat(board_t() - 20, 5));
-  EXPECT_FALSE(heartbeat(board_t(), 10));
   EXPECT_FALSE(paths.is_newest(0, board_t() - 1, now));
   FieldSet fields;
   fields.add(StateField::safe);
@@ -156,10 +163,7 @@ TEST_F(OnePath, TheBoardsClockMayWrap) {
   EXPECT_TRUE(paths.is_newest(0, board_t(), now));
 }
 
-TEST_F(OnePath, ADatagramOfAnEarlierBootIsDroppedAndAsksForAnAnswer) {
-  heartbeat();
-  ask();
-  ASSERT_EQ(answer(), Admission::yes);
+TEST_F(AnsweredPath, ADatagramOfAnEarlierBootIsDroppedAndAsksForAnAnswer) {
   pass(200);
   EXPECT_EQ(paths.admit(0, 5, board_t() - 3'600'000, now), Admission::no);
   EXPECT_EQ(paths.to_ask(now), 1);
@@ -168,10 +172,7 @@ TEST_F(OnePath, ADatagramOfAnEarlierBootIsDroppedAndAsksForAnAnswer) {
   EXPECT_EQ(state(), Admission::yes);
 }
 
-TEST_F(OnePath, AnAnswerProvesARestart) {
-  heartbeat();
-  ask();
-  ASSERT_EQ(answer(), Admission::yes);
+TEST_F(AnsweredPath, AnAnswerProvesARestart) {
   pass(200);
   reboot();
   EXPECT_EQ(state(), Admission::no);
@@ -181,19 +182,13 @@ TEST_F(OnePath, AnAnswerProvesARestart) {
   EXPECT_EQ(state(), Admission::yes);
 }
 
-TEST_F(OnePath, AnAnswerToAnotherProgramDoesNotProveARestart) {
-  heartbeat();
-  ask();
-  ASSERT_EQ(answer(), Admission::yes);
+TEST_F(AnsweredPath, AnAnswerToAnotherProgramDoesNotProveARestart) {
   reboot();
   EXPECT_EQ(answer(), Admission::yes) << "an answer to another program is admitted";
   EXPECT_EQ(state(), Admission::no) << "the restart is not proved";
 }
 
-TEST_F(OnePath, TenUnansweredQuestionsProveARestart) {
-  heartbeat();
-  ask();
-  ASSERT_EQ(answer(), Admission::yes);
+TEST_F(AnsweredPath, TenUnansweredQuestionsProveARestart) {
   reboot();
   int questions = 0;
   while (state() == Admission::no && questions < 100) {
@@ -205,10 +200,7 @@ TEST_F(OnePath, TenUnansweredQuestionsProveARestart) {
   EXPECT_EQ(questions, 10) << "firmware without answers may run after the restart";
 }
 
-TEST_F(OnePath, QuestionsDuringAnOutageDoNotProveARestart) {
-  heartbeat();
-  ask();
-  ASSERT_EQ(answer(), Admission::yes);
+TEST_F(AnsweredPath, QuestionsDuringAnOutageDoNotProveARestart) {
   for (int i = 0; i < 20; ++i) {  // time of the board's clock during an outage
     pass(100);
     ask();
@@ -217,10 +209,7 @@ TEST_F(OnePath, QuestionsDuringAnOutageDoNotProveARestart) {
       << "a replay must not be believed";
 }
 
-TEST_F(OnePath, AnUnsentQuestionIsRepeatedAndNotCounted) {
-  heartbeat();
-  ask();
-  ASSERT_EQ(answer(), Admission::yes);
+TEST_F(AnsweredPath, AnUnsentQuestionIsRepeatedAndNotCounted) {
   reboot();
   for (int i = 0; i < 20; ++i) {
     EXPECT_EQ(state(), Admission::no) << i;
@@ -230,27 +219,19 @@ TEST_F(OnePath, AnUnsentQuestionIsRepeatedAndNotCounted) {
   }
 }
 
-TEST_F(OnePath, AnUnsentQuestionOfTheProgramIsNotRepeated) {
-  heartbeat();
-  ask();
-  ASSERT_EQ(answer(), Admission::yes);
+TEST_F(AnsweredPath, AnUnsentQuestionOfTheProgramIsNotRepeated) {
   paths.asked(0, ++question, false, now);
   pass(1000);
   EXPECT_EQ(paths.to_ask(now), 0);
 }
 
-TEST_F(OnePath, ANewBoardOnTheOnlyPathCountsAsARestart) {
-  state();
-  ask();
-  ASSERT_EQ(answer(), Admission::yes);
+TEST_F(AnsweredPath, ANewBoardOnTheOnlyPathCountsAsARestart) {
   paths.on_transport(0, false, true, now);
   pass(5);
   paths.on_transport(0, true, true, now);
   ask();
-  Identity identity{Text("0.1.0"), Text("another"), Text("udp")};
-  identity.has_asked = true;
-  identity.asked = question;
-  EXPECT_EQ(paths.admit_identity(0, identity, 77, now), Admission::restarted);
+  reboot();
+  EXPECT_EQ(answer("another"), Admission::restarted);
   EXPECT_FALSE(paths.two_boards());
 }
 

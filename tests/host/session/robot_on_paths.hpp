@@ -57,8 +57,9 @@ class RobotOnPaths final : private DrivenSession::Handler {
   // Delivers a datagram to the host as if the datagram arrived over that path.
   void bring(std::size_t path, std::string_view bytes);
   CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);
+  Ticket send(const Command& command) { return session->send(command, timeout, now()); }
   CommandResult drive(int pwm) {
-    return finish(session->send(Command::osmc(1, Pwm(pwm), Direction::forward), timeout, now()));
+    return finish(send(Command::osmc(1, Pwm(pwm), Direction::forward)));
   }
 
   Time now() const { return Time{(now_ms_ - slept_ms_) * 1000}; }

@@ -36,7 +36,7 @@ void ScriptedLink::pass(Time duration) {
   now = end;
 }
 
-std::uint32_t ScriptedLink::board_clock() const {
+std::uint32_t ScriptedLink::board_ms() const {
   return static_cast<std::uint32_t>(now.count() / 1000) + clock_offset_;
 }
 
@@ -50,9 +50,8 @@ void ScriptedLink::reboot() {
   board_pnum = 1;
 }
 
-void ScriptedLink::finish(std::string_view fields) {
-  raw(with_crc(std::string(fields) + "PNum:" + std::to_string(board_pnum++) +
-               ";T:" + std::to_string(board_clock()) + ";"));
+std::string ScriptedLink::stamp() {
+  return "PNum:" + std::to_string(board_pnum++) + ";T:" + std::to_string(board_ms()) + ";";
 }
 
 void ScriptedLink::boot_heartbeat() { raw("H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^"); }
@@ -60,36 +59,34 @@ void ScriptedLink::boot_heartbeat() { raw("H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^"); 
 void ScriptedLink::heartbeat(SafeReason reason) {
   const std::string safe =
       reason == SafeReason::none ? "" : "SAFE:" + std::to_string(static_cast<int>(reason)) + ";";
-  raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(board_pnum++) +
-               ";T:" + std::to_string(board_clock()) + ";" + safe));
+  raw(with_crc("H:R4-ROS2;" + stamp() + safe));
 }
 
 void ScriptedLink::stopped(std::uint32_t stop, int cause) {
-  raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(board_pnum++) +
-               ";T:" + std::to_string(board_clock()) + ";SAFE:2;CAUSE:" + std::to_string(cause) +
+  raw(with_crc("H:R4-ROS2;" + stamp() + "SAFE:2;CAUSE:" + std::to_string(cause) +
                ";STOP:" + std::to_string(stop) + ";"));
 }
 
-void ScriptedLink::state(std::string_view fields) { finish(fields); }
+void ScriptedLink::state(std::string_view fields) { raw(with_crc(std::string(fields) + stamp())); }
 
 void ScriptedLink::executed(std::uint32_t pnum) {
-  finish("AIN24:24.28;SAFE:0;CMD:" + std::to_string(pnum) + ";");
+  state("AIN24:24.28;SAFE:0;CMD:" + std::to_string(pnum) + ";");
 }
 
 void ScriptedLink::nack(std::uint32_t pnum, std::string_view code) {
   const std::string began =
       session_pnum == 0 ? "" : "SESSION:" + std::to_string(session_pnum) + ";";
-  finish("N:" + std::to_string(pnum) + "," + std::string(code) + ";" + began + asker());
+  state("N:" + std::to_string(pnum) + "," + std::string(code) + ";" + began + asker());
 }
 
 void ScriptedLink::identity(std::string_view capabilities, bool names_question) {
   if (names_question && count('Q') != 0) return answer(last('Q').pnum, capabilities);
-  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";" + asker());
+  state("I:R4,0.1.0,board-7," + std::string(capabilities) + ";" + asker());
 }
 
 void ScriptedLink::answer(std::uint32_t question, std::string_view capabilities) {
-  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";ASKED:" + std::to_string(question) +
-         ";" + asker());
+  state("I:R4,0.1.0,board-7," + std::string(capabilities) + ";ASKED:" + std::to_string(question) +
+        ";" + asker());
 }
 
 std::string ScriptedLink::asker() const {
@@ -101,6 +98,10 @@ std::string ScriptedLink::asker() const {
 
 void ScriptedLink::connect() {
   heartbeat();
+  connect_after_heartbeat();
+}
+
+void ScriptedLink::connect_after_heartbeat() {
   pass(std::chrono::milliseconds{10});
   ASSERT_EQ(count('F'), 1U) << "the session must choose its fields when the link comes up";
   executed(last('F').pnum);

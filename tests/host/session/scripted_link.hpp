@@ -77,12 +77,14 @@ class ScriptedLink : private DrivenSession::Handler {
   void raw(std::string_view bytes);
   // The board restarts, with another clock and new packet numbers, and sends nothing.
   void reboot();
-  std::uint32_t board_ms() const { return board_clock(); }
+  std::uint32_t board_ms() const;
   std::uint32_t board_pnum = 5000;
+  std::string stamp();  // "PNum:…;T:…;" of the board's next datagram
 
   // Exchanges heartbeat and echo, and confirms F, so that commands can be sent. Clears the sent
   // datagrams.
   void connect();
+  void connect_after_heartbeat();  // the test has sent the heartbeat of the board
 
   // The host's datagrams with commands of this letter, and the newest of them.
   std::vector<Sent> all(char letter) const;
@@ -90,9 +92,6 @@ class ScriptedLink : private DrivenSession::Handler {
   std::size_t count(char letter) const { return all(letter).size(); }
 
  private:
-  std::uint32_t board_clock() const;
-  void finish(std::string_view fields);
-
   SendResult transmit(std::size_t, std::string_view datagram, Priority priority) override;
   TransportTrouble trouble() const override { return frames; }
   void on_state(const ReceivedState& state, const Datagram&) override { states.push_back(state); }
@@ -135,10 +134,7 @@ struct NewSession : testing::Test {
 };
 
 struct ConnectedSession : NewSession {
-  explicit ConnectedSession(SessionOptions options = ScriptedLink::without_questions())
-      : NewSession(std::move(options)) {
-    link.connect();
-  }
+  ConnectedSession() { link.connect(); }
 };
 
 }  // namespace r4::test

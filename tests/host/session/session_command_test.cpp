@@ -3,11 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "host/session/session.hpp"
-#include "protocol/link/board_link.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "scripted_link.hpp"
-#include "tests/support/datagrams.hpp"
+#include "tests/support/problems.hpp"
 
 namespace r4::test {
 namespace {
@@ -165,13 +164,9 @@ TEST_F(SessionCommand, IsRefusedOutsideItsRanges) {
         Command::dhb12(0, Pwm(1), Direction::forward), Command::servo(17, Microseconds(1)),
         Command::proximity(1, Centimetres(401)), Command::fields(""), Command::setting("", "1"),
         Command::fields("A;B"), Command::setting("rate", "1^2")}) {
-    try {
-      link.session.send(wrong, 1s, link.now);
-      ADD_FAILURE() << to_text(wrong) << " must be refused";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.kind(), ErrorKind::usage);
-      EXPECT_FALSE(error.problem().fix.empty()) << error.what();
-    }
+    const Problem problem = problem_of([&] { link.session.send(wrong, 1s, link.now); });
+    EXPECT_EQ(problem.kind, ErrorKind::usage) << to_text(wrong);
+    EXPECT_FALSE(problem.fix.empty()) << to_text(wrong);
     EXPECT_THROW(link.session.post(wrong, link.now), Error);
   }
   const std::string long_text(2000, 'A');
@@ -197,16 +192,6 @@ TEST_F(SessionCommand, SentOnceIsNotRepeatedAndDoesNotOvertakeEarlierCommands) {
   link.pass(1s);
   EXPECT_EQ(link.count('S'), 1U);
   EXPECT_EQ(link.results.size(), 1U) << "only the command that was sent has a result";
-}
-
-TEST_F(NewSession, ConfirmsIdentifyByTheAnswer) {
-  const Ticket ticket = link.session.send(Command::identify(), 1s, link.now);
-  EXPECT_EQ(link.last('Q').command, "Q:ID");
-  link.pass(2ms);
-  link.identity();
-  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
-  EXPECT_EQ(result(ticket).elapsed, 2ms);
-  EXPECT_DOUBLE_EQ(link.session.statistics(link.now).round_trip_us, 2000);
 }
 
 TEST_F(NewSession, DoesNotConfirmIdentifyByASecondAnswerToAnEarlierQuestion) {
@@ -235,21 +220,6 @@ TEST_F(SessionStop, CannotBeCancelled) {
   EXPECT_TRUE(link.results.empty());
   link.pass(100ms);
   EXPECT_GT(link.count('E'), 3U) << "the stop must be repeated";
-}
-
-TEST_F(SessionCommand, EndsWithTheSession) {
-  const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
-  const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
-  link.session.end_all(link.now);
-  EXPECT_EQ(outcome(ticket), Outcome::cancelled) << "the stop must cancel it";
-  EXPECT_EQ(outcome(stop), Outcome::closed);
-}
-
-TEST_F(NewSession, SendsAStopBeforeTheLinkIsUpWithTheTopPriority) {
-  link.session.send(Command::stop(), 1s, link.now);
-  ASSERT_EQ(link.count('E'), 1U);
-  EXPECT_EQ(link.last('E').command, "E:STOP");
-  EXPECT_EQ(link.last('E').priority, Priority::stop);
 }
 
 TEST_F(SessionStop, IsRepeatedEveryTwentyMillisecondsUntilTheBoardReportsIt) {
@@ -370,20 +340,26 @@ TEST_F(SessionClear, IsCancelledIfItWasCalledBeforeAnOwnStopIsConfirmed) {
 // --- refusals
 
 TEST_F(SessionRefusal, OfALaterSessionDoesNotEndTheCommand) {
-  const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
+  const std::uint32_t ours = link.session_pnum;
+  const Ticket ticket = link.session.send(turn_motor, 10s, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
+  const auto refused_by = [&](std::uint32_t session, std::string_view code) {
+    link.session_pnum = session;
+    link.nack(pnum, code);
+    return !under_way(ticket);
+  };
   link.pass(100ms);
-  link.session_pnum = 0;  // the host's address has changed, so the board treats it as a stranger
-  link.nack(pnum, "SAFE");
-  EXPECT_TRUE(under_way(ticket));
-  link.session_pnum = pnum + 1;  // the host's first heartbeat after an outage
-  link.nack(pnum, "STALE");
-  EXPECT_TRUE(under_way(ticket));
-  link.session_pnum = 99;  // the number of another session
-  link.nack(pnum, "STALE");
-  EXPECT_TRUE(under_way(ticket));
-  link.session_pnum = 100;
-  link.nack(pnum, "STALE");
+  EXPECT_FALSE(refused_by(0, "SAFE"))
+      << "the host's address has changed, so the board treats it as a stranger";
+  EXPECT_FALSE(refused_by(pnum + 1, "STALE")) << "the host's first heartbeat after an outage";
+  EXPECT_FALSE(refused_by(99, "STALE")) << "the number of another session";
+  link.pass(1100ms);
+  ASSERT_EQ(link.session.link().state, HostLinkState::lost);
+  link.heartbeat();
+  EXPECT_FALSE(refused_by(link.last('H').pnum, "STALE"))
+      << "the board may have executed it before the outage";
+  // Only the direction to the host was cut, so the board continues the session.
+  EXPECT_TRUE(refused_by(ours, "STALE"));
   EXPECT_EQ(outcome(ticket), Outcome::refused);
 }
 
@@ -407,6 +383,25 @@ TEST_F(NewSession, SendsAStopEvenWhenSixteenAreUnderWay) {
   EXPECT_EQ(link.count('E'), Session::max_stops + 1);
 }
 
+TEST_F(NewSession, HoldsCommandsUntilTheOtherHostHasLeft) {
+  link.nack(link.last('H').pnum, "BUSY");
+  const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
+    link.pass(100ms);
+    link.nack(link.last('H').pnum, "BUSY");
+  }
+  EXPECT_EQ(link.count('O'), 0U);
+  link.pass(301ms);
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy)) << "the board has stopped refusing";
+  link.heartbeat();
+  link.pass(10ms);
+  link.executed(link.last('F').pnum);
+  ASSERT_EQ(link.count('O'), 1U);
+  link.executed(link.last('O').pnum);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+}
+
 TEST_F(SessionBusy, AHostWithoutItsTurnOnTheBusMayOnlyStopTheBoard) {
   link.place_taken = true;
   const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
@@ -428,41 +423,6 @@ TEST_F(SessionBusy, AHostWithoutItsTurnOnTheBusMayOnlyStopTheBoard) {
   link.place_taken = false;
   link.pass(400ms);
   EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy));
-}
-
-TEST_F(NewSession, HoldsCommandsUntilTheOtherHostHasLeft) {
-  link.nack(link.last('H').pnum, "BUSY");
-  const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
-  for (int i = 0; i < 10; ++i) {
-    EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
-    link.pass(100ms);
-    link.nack(link.last('H').pnum, "BUSY");
-  }
-  EXPECT_EQ(link.count('O'), 0U);
-  link.pass(301ms);
-  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy)) << "the board has stopped refusing";
-  link.heartbeat();
-  link.pass(10ms);
-  link.executed(link.last('F').pnum);
-  ASSERT_EQ(link.count('O'), 1U);
-  link.executed(link.last('O').pnum);
-  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
-}
-
-TEST_F(SessionBusy, ARefusalAfterAnOutageCountsOnlyInTheSameSession) {
-  const Ticket ticket = link.session.send(turn_motor, 10s, link.now);
-  const std::uint32_t pnum = link.last('O').pnum;
-  link.pass(1100ms);
-  ASSERT_EQ(link.session.link().state, HostLinkState::lost);
-  link.heartbeat();
-  const std::uint32_t before = link.session_pnum;
-  link.session_pnum = link.last('H').pnum;
-  link.nack(pnum, "STALE");
-  EXPECT_TRUE(under_way(ticket)) << "the board may have executed it before the outage";
-  // Only the direction to the host was cut, so the board continues the session.
-  link.session_pnum = before;
-  link.nack(pnum, "STALE");
-  EXPECT_EQ(outcome(ticket), Outcome::refused);
 }
 
 }  // namespace

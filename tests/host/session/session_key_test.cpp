@@ -27,18 +27,12 @@ SessionOptions keyed() {
 
 void keyed_heartbeat(ScriptedLink& link, const std::string& its_nonce = nonce,
                      const std::string& reason = "") {
-  link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(link.board_pnum++) +
-                    ";T:" + std::to_string(link.board_ms()) + reason + ";AN:" + its_nonce + ";"));
+  link.raw(with_crc("H:R4-ROS2;" + link.stamp() + reason + "AN:" + its_nonce + ";"));
 }
 
 void connect_keyed(ScriptedLink& link) {
   keyed_heartbeat(link);
-  link.pass(10ms);
-  ASSERT_EQ(link.count('F'), 1U);
-  link.executed(link.last('F').pnum);
-  ASSERT_TRUE(link.session.in_control(link.now));
-  link.session_pnum = link.last('H').pnum;
-  link.sent.clear();
+  link.connect_after_heartbeat();
 }
 
 // For two seconds, the board sends its nonce and reports that it is booting.
@@ -118,16 +112,10 @@ TEST_F(SessionKey, CountsFromTheTimeSince1970) {
   EXPECT_EQ(signature_of(link.last('H')).find("2,1700005000"), 0U) << signature_of(link.last('H'));
 }
 
-TEST_F(SessionWithKey, FollowsTheBoardToAnotherNonce) {
-  keyed_heartbeat(link, "fedcba9876543210");
-  EXPECT_EQ(verdict(link, link.last('H'), "fedcba9876543210"), Verdict::authentic);
-}
-
 TEST_F(SessionWithKey, ALateHeartbeatDoesNotBringTheOldNonceBack) {
-  const std::uint32_t late = link.board_pnum++;
+  const std::string late = link.stamp();
   keyed_heartbeat(link, "fedcba9876543210");
-  link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(late) +
-                    ";T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
+  link.raw(with_crc("H:R4-ROS2;" + late + "AN:" + nonce + ";"));
   link.session.send(turn_motor, 1s, link.now);
   EXPECT_EQ(verdict(link, link.last('O'), "fedcba9876543210"), Verdict::authentic);
 }
@@ -206,7 +194,7 @@ TEST_F(SessionKey, ReportsThatTheBoardDoesNotAcceptItsKey) {
 // The previous host ended with a stop, so the board's cause hides whether it has a host.
 TEST_F(SessionKey, ReportsThatAStoppedBoardDoesNotAcceptItsKey) {
   for (int i = 0; i < 12; ++i) {
-    keyed_heartbeat(link, nonce, ";SAFE:2");
+    keyed_heartbeat(link, nonce, "SAFE:2;");
     link.pass(100ms);
   }
   EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
@@ -221,7 +209,7 @@ TEST_F(SessionKey, ReportsThatAStoppedBoardDoesNotAcceptItsKey) {
 
 TEST_F(SessionKey, AStoppedBoardThatAnswersBusyHasAnotherHost) {
   for (int i = 0; i < 30; ++i) {
-    keyed_heartbeat(link, nonce, ";SAFE:2");
+    keyed_heartbeat(link, nonce, "SAFE:2;");
     link.nack(link.last('H').pnum, "BUSY");
     link.pass(100ms);
     EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
@@ -235,13 +223,13 @@ TEST_F(SessionWithKey, AStateASecondShowsThatAStoppedBoardAcceptsTheKey) {
   for (int i = 0; i < 10; ++i) {
     link.state("SAFE:2;CMD:0;");
     for (int j = 0; j < 10; ++j) {
-      keyed_heartbeat(link, nonce, ";SAFE:2");
+      keyed_heartbeat(link, nonce, "SAFE:2;");
       link.pass(100ms);
       EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
     }
   }
   for (int j = 0; j < 20; ++j) {  // the board sends no state after this
-    keyed_heartbeat(link, nonce, ";SAFE:2");
+    keyed_heartbeat(link, nonce, "SAFE:2;");
     link.pass(100ms);
   }
   EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);

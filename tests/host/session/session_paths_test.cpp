@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "r4link/error.hpp"
 #include "robot_on_paths.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
@@ -116,7 +115,7 @@ TEST(SessionPaths, MissNothingWhileOnePathIsCutAThousandTimes) {
   EXPECT_EQ(robot.session->statistics(robot.now()).timed_out, 0U);
 }
 
-TEST_F(TwoPaths, ReportAtOnceThatATransportIsDown) {
+TEST_F(TwoPaths, ReportATransportThatIsDownAtOnceAndASilentPathWithinTheTimeout) {
   robot.plug(0, false);
   EXPECT_EQ(robot.links.back().carrying, 2);
   EXPECT_EQ(robot.session->path(0, robot.now()).state, PathState::down);
@@ -125,10 +124,6 @@ TEST_F(TwoPaths, ReportAtOnceThatATransportIsDown) {
   robot.plug(0, true);
   robot.run(200);
   EXPECT_EQ(robot.links.back().carrying, 3);
-  EXPECT_EQ(robot.trips, 0);
-}
-
-TEST_F(TwoPaths, ReportASilentPathWithinTheTimeout) {
   robot.cut(1);
   robot.run(990);
   EXPECT_EQ(robot.session->link().carrying, 3);
@@ -136,6 +131,7 @@ TEST_F(TwoPaths, ReportASilentPathWithinTheTimeout) {
   EXPECT_EQ(robot.session->link().carrying, 1);
   EXPECT_EQ(robot.session->path(1, robot.now()).state, PathState::silent);
   EXPECT_EQ(robot.session->link().state, HostLinkState::active);
+  EXPECT_EQ(robot.trips, 0);
 }
 
 TEST(SessionPaths, TheLinkIsLostOnlyWithAllPathsAndRecoversWithOne) {
@@ -171,8 +167,7 @@ TEST_F(TwoPaths, ReportARefusalOnce) {
   robot.nacks.clear();
   robot.drive(1);
   EXPECT_TRUE(robot.nacks.empty()) << "the answer to a duplicate must not be reported";
-  const Ticket ticket =
-      robot.session->send(Command::setting("timeout", "100"), RobotOnPaths::timeout, robot.now());
+  const Ticket ticket = robot.send(Command::setting("timeout", "100"));
   // Out of range: the timeout must exceed the heartbeat interval.
   const CommandResult result = robot.finish(ticket);
   EXPECT_EQ(result.outcome, Outcome::refused);
@@ -185,8 +180,7 @@ TEST_F(TwoPaths, ReportARefusalOnce) {
 // be executed.
 TEST_F(TwoPaths, AuthEndsACommandOnlyWithoutAnotherPath) {
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
-  const Ticket ticket =
-      robot.session->send(Command::setting("node", "3"), RobotOnPaths::timeout, robot.now());
+  const Ticket ticket = robot.send(Command::setting("node", "3"));
   robot.run(5);
   Datagram first;
   Datagram command;
@@ -231,8 +225,7 @@ TEST(SessionPaths, AreRefusedIfTheyLeadToTwoBoards) {
   EXPECT_EQ(robot.session->path(1, robot.now()).state, PathState::other_board);
   EXPECT_EQ(robot.session->path(0, robot.now()).board_id, "board-0");
   EXPECT_EQ(robot.session->path(1, robot.now()).board_id, "board-1");
-  robot.session->send(Command::osmc(1, Pwm(1), Direction::forward), RobotOnPaths::timeout,
-                      robot.now());
+  robot.send(Command::osmc(1, Pwm(1), Direction::forward));
   robot.run(1000);
   for (const Cable& cable : robot.cables) {
     ASSERT_FALSE(cable.sent.empty());
@@ -330,27 +323,16 @@ TEST(SessionPaths, AllPathsCarryAStopEvenToAnUnknownBoard) {
   RobotOnPaths robot(Cables{{1}, {1}, {1}});
   robot.plug(0, true);
   robot.plug(1, true);
-  const Ticket early = robot.session->send(Command::stop(), RobotOnPaths::timeout, robot.now());
+  const Ticket early = robot.send(Command::stop());
   for (const std::size_t path : {0U, 1U}) {
     EXPECT_EQ(robot.cables[path].all('E').size(), 1U)
         << "a stop goes to every path, even before its board is known";
   }
   EXPECT_EQ(robot.finish(early).outcome, Outcome::confirmed);
   robot.run(1000);
-  robot.finish(robot.session->send(Command::clear(), RobotOnPaths::timeout, robot.now()));
+  robot.finish(robot.send(Command::clear()));
   robot.cut(0);
-  EXPECT_EQ(robot.finish(robot.session->send(Command::stop(), RobotOnPaths::timeout, robot.now()))
-                .outcome,
-            Outcome::confirmed);
-}
-
-TEST(SessionPaths, TheFarewellEndsTheSessionOnEveryPath) {
-  RobotOnPaths robot(Cables{{1}, {3}});
-  robot.connect();
-  robot.drive(1);
-  EXPECT_EQ(robot.finish(robot.session->leave(RobotOnPaths::timeout, robot.now())).outcome,
-            Outcome::confirmed);
-  EXPECT_FALSE(robot.board(0).link().has_owner());
+  EXPECT_EQ(robot.finish(robot.send(Command::stop())).outcome, Outcome::confirmed);
 }
 
 TEST_F(TwoPaths, AHeartbeatFromBeforeTheFarewellDoesNotConfirmIt) {
@@ -421,24 +403,6 @@ TEST(SessionPaths, AreArmedTogether) {
   robot.run(1500);
   EXPECT_EQ(robot.session->disarmed_by(), DisarmCause::none);
   EXPECT_EQ(robot.drive(4).outcome, Outcome::confirmed);
-}
-
-TEST(SessionPaths, AWatcherHasALeaseOnEachPath) {
-  RobotOnPaths robot(Cables{{1}, {1}}, SessionOptions{}, BoardRole::watch);
-  robot.connect();
-  robot.run(2000);
-  EXPECT_EQ(robot.session->link().carrying, 3);
-  for (const Cable& cable : robot.cables) {
-    EXPECT_GE(cable.all('W').size(), 3U);
-    EXPECT_TRUE(cable.all('H').empty());
-  }
-  robot.told_states = 0;
-  robot.longest_gap_ms = 0;
-  robot.cut(0);
-  robot.run(1000);
-  EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
-  EXPECT_LE(robot.longest_gap_ms, 20);
-  EXPECT_FALSE(robot.went_back);
 }
 
 }  // namespace

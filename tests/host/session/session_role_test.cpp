@@ -63,19 +63,27 @@ TEST_F(SessionRole, ReleasingControlWatchesAfterTheConfirmedFarewell) {
             ErrorKind::usage);
 }
 
-TEST_F(SessionRole, ArmingEndsAsSoonAsControlIsReleased) {
+TEST_F(SessionRole, ReleasingControlDisarmsAndTheNextControlIsANewSession) {
   take();
+  const SessionId first = link.host_session;
   const Ticket armed = link.session.arm(1s, link.now);
   link.pass(1ms);
-  link.state("SAFE:0;RELAYS:1;CMD:" + std::to_string(link.last('R').pnum) + ";");
+  const std::uint32_t of_first = link.last('R').pnum;
+  link.state("SAFE:0;RELAYS:1;CMD:" + std::to_string(of_first) + ";");
   ASSERT_EQ(outcome(armed), Outcome::confirmed);
   link.session.release_control(100ms, link.now);
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet);
   EXPECT_EQ(link.arming, (std::vector<DisarmCause>{DisarmCause::none, DisarmCause::not_yet}));
   link.heartbeat(SafeReason::link);
   change(BoardRole::watch);
-  link.sent.clear();
-  take();
+  change(BoardRole::control);
+  EXPECT_NE(link.host_session, first);
+  link.heartbeat();
+  link.pass(10ms);
+  link.executed(of_first);
+  EXPECT_FALSE(link.session.in_control(link.now)) << "the number is of the earlier session";
+  link.executed(link.last('F').pnum);
+  EXPECT_TRUE(link.session.in_control(link.now));
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet)
       << "relay 1 is closed, but the session was not armed";
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::not_armed);
@@ -99,22 +107,6 @@ TEST_F(SessionRole, AChangeOfRoleCancelsEarlierCommands) {
   EXPECT_NE(link.host_session, earlier);
   link.pass(1s);
   EXPECT_EQ(link.count('O') + link.count('F') + link.count('R'), 0U);
-}
-
-TEST_F(SessionRole, TakingControlAgainBeginsANewSession) {
-  take();
-  const SessionId first = link.host_session;
-  const std::uint32_t of_first =
-      link.session.send(Command::fields("ENC1"), 1s, link.now) != 0 ? link.last('F').pnum : 0;
-  link.session.release_control(100ms, link.now);
-  link.heartbeat(SafeReason::link);
-  change(BoardRole::watch);
-  change(BoardRole::control);
-  EXPECT_NE(link.host_session, first);
-  link.heartbeat();
-  link.pass(10ms);
-  link.executed(of_first);
-  EXPECT_FALSE(link.session.in_control(link.now)) << "the number is of the earlier session";
 }
 
 TEST_F(SessionRole, AStopContinuesOverEveryChange) {

@@ -18,6 +18,12 @@ class SleepingHost : public ::testing::TestWithParam<Cables> {
   void cut_all(RobotOnPaths& of, bool is_cut = true) {
     for (std::size_t path = 0; path < of.cables.size(); ++path) of.cut(path, is_cut);
   }
+  static void expect_rest(RobotOnPaths& of, int duration_ms = 5000) {
+    for (int ms = 0; ms < duration_ms; ++ms) {
+      of.run(1);
+      ASSERT_FALSE(drives(of)) << ms << " ms later";
+    }
+  }
   // All sleeps are longer than the time that the board waits for its host. Some sleeps are shorter
   // than the tolerance of the board's clock, and some sleeps are longer.
   static constexpr std::uint32_t naps_ms[] = {1500, 9000, 60'000};
@@ -31,12 +37,10 @@ TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
     RobotOnPaths sleeper(GetParam());
     sleeper.connect();
     ASSERT_EQ(sleeper.drive(100).outcome, Outcome::confirmed);
+    SCOPED_TRACE(nap_ms);
     sleeper.sleep(nap_ms);
     ASSERT_FALSE(drives(sleeper));
-    for (int ms = 0; ms < 5000; ++ms) {
-      sleeper.run(1);
-      ASSERT_FALSE(drives(sleeper)) << ms << " ms after waking from " << nap_ms << " ms";
-    }
+    expect_rest(sleeper);
     EXPECT_EQ(sleeper.restarts, 1);
     EXPECT_TRUE(sleeper.session->in_control(sleeper.now()));
     EXPECT_EQ(sleeper.drive(50).outcome, Outcome::confirmed)
@@ -48,10 +52,7 @@ TEST_P(SleepingHost, FindsTheMotorsOffAfterAPauseOfItsVirtualMachine) {
   robot.connect();
   ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
   robot.pause(60'000);
-  for (int ms = 0; ms < 5000; ++ms) {
-    robot.run(1);
-    ASSERT_FALSE(drives(robot)) << ms << " ms after the pause";
-  }
+  expect_rest(robot);
   EXPECT_EQ(robot.restarts, 1);
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
@@ -72,10 +73,7 @@ TEST_P(SleepingHost, CancelsEarlierCommandsAndArms) {
     if (link == Link::restarted) armed.reboot(0);
     armed.sleep(9000);
     cut_all(armed, false);
-    for (int ms = 0; ms < 5000; ++ms) {
-      armed.run(1);
-      ASSERT_FALSE(drives(armed)) << ms << " ms after waking";
-    }
+    expect_rest(armed);
     EXPECT_EQ(armed.finish(arm).outcome, Outcome::cancelled);
     EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
     if (link == Link::lost) {
@@ -92,11 +90,8 @@ TEST_P(SleepingHost, SwitchesTheMotorsOffBeforeALongBoardTimeout) {
   ASSERT_EQ(patient.drive(100).outcome, Outcome::confirmed);
   patient.sleep(3000);
   ASSERT_TRUE(drives(patient)) << "the board's timeout has not ended yet";
-  patient.run(100);
-  for (int ms = 0; ms < 3000; ++ms) {
-    ASSERT_FALSE(drives(patient)) << ms << " ms later";
-    patient.run(1);
-  }
+  patient.run(99);
+  expect_rest(patient, 3000);
   EXPECT_TRUE(patient.session->in_control(patient.now()));
 }
 
@@ -111,10 +106,7 @@ TEST_P(SleepingHost, RepeatsNoEarlierCommand) {
     sender.run(later_ms);
     sender.sleep(60'000);
     cut_all(sender, false);
-    for (int ms = 0; ms < 5000; ++ms) {
-      sender.run(1);
-      ASSERT_FALSE(drives(sender)) << ms << " ms after waking";
-    }
+    expect_rest(sender);
     EXPECT_EQ(sender.finish(ticket).outcome, Outcome::cancelled);
   }
 }

@@ -73,56 +73,54 @@ TEST_F(SessionState, ForgetsAChipFaultWhenTheBoardStopsReportingIt) {
   EXPECT_FALSE(link.session.state().fault.any()) << "a watchdog reset is not a fault of a chip";
 }
 
+// A heartbeat shows the restart or, if the earlier datagrams were lost, a state.
 TEST_F(SessionState, IsClearedByARestartOfTheBoard) {
-  link.state("OSMC1:358,1;ENC1:7;SAFE:6;FAULT:97,1;CMD:1;");
-  link.pass(300ms);
-  link.reboot();
-  link.boot_heartbeat();
-  link.heartbeat();
-  EXPECT_EQ(link.restarts, 1);
-  EXPECT_FALSE(link.session.state().any());
-  link.state("AIN24:24.28;");
-  const ReceivedState& state = link.session.state();
-  EXPECT_EQ(state.osmc(1).pwm, 0);
-  EXPECT_EQ(state.encoder(1), 0);
-  EXPECT_FALSE(state.fault.any());
-  EXPECT_EQ(state.safe, SafeReason::none);
-  EXPECT_EQ(link.restarts, 1);
-}
-
-TEST_F(SessionState, BeginsWithTheStateThatShowsTheRestart) {
-  link.state("OSMC1:358,1;ENC1:7;SAFE:0;CMD:1;");
-  link.reboot();
-  link.state("ENC2:5;SAFE:3;");  // the earlier datagrams were lost
-  EXPECT_EQ(link.restarts, 1);
-  const ReceivedState& state = link.states.back();
-  EXPECT_EQ(state.encoder(2), 5);
-  EXPECT_EQ(state.safe, SafeReason::handle);
-  EXPECT_EQ(state.osmc(1).pwm, 0);
-  EXPECT_EQ(state.encoder(1), 0);
+  for (const bool by_heartbeat : {true, false}) {
+    ConnectedLink each;
+    each.state("OSMC1:358,1;ENC1:7;SAFE:6;FAULT:97,1;CMD:1;");
+    each.pass(by_heartbeat ? 300ms : 0ms);
+    each.reboot();
+    if (by_heartbeat) {
+      each.boot_heartbeat();
+      each.heartbeat();
+      EXPECT_EQ(each.restarts, 1);
+      EXPECT_FALSE(each.session.state().any());
+    }
+    each.state(by_heartbeat ? "ENC2:5;" : "ENC2:5;SAFE:3;");
+    EXPECT_EQ(each.restarts, 1) << by_heartbeat;
+    const ReceivedState& state = each.states.back();
+    EXPECT_EQ(state.encoder(2), 5) << by_heartbeat;
+    EXPECT_EQ(state.encoder(1), 0) << by_heartbeat;
+    EXPECT_EQ(state.osmc(1).pwm, 0) << by_heartbeat;
+    EXPECT_FALSE(state.fault.any()) << by_heartbeat;
+    EXPECT_EQ(state.safe, by_heartbeat ? SafeReason::none : SafeReason::handle);
+  }
 }
 
 TEST_F(SessionState, StaysOverAnOutage) {
   link.state("ENC1:7;SAFE:0;CMD:1;");
   link.pass(60s);
   link.heartbeat(SafeReason::link);
+  EXPECT_EQ(link.session.link(),
+            (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::link, .carrying = 1}));
   link.pass(10ms);
   link.executed(1);
+  EXPECT_EQ(link.session.link().state, HostLinkState::active);
   EXPECT_EQ(link.restarts, 0);
   EXPECT_EQ(link.session.state().encoder(1), 7);
 }
 
 TEST_F(SessionState, KeepsTheSafeReasonOfAHeartbeatThatOvertookIt) {
-  for (const std::uint32_t earlier_ms : {0U, 5U}) {
+  for (const int later_ms : {0, 5}) {
     ConnectedLink each;
     each.pass(20ms);
-    const std::uint32_t number = each.board_pnum++;
+    const std::string earlier = each.stamp();
+    each.pass(std::chrono::milliseconds(later_ms));
     each.heartbeat(SafeReason::stop);
-    each.raw(with_crc("AIN24:24.28;SAFE:0;PNum:" + std::to_string(number) +
-                      ";T:" + std::to_string(each.board_ms() - earlier_ms) + ";"));
+    each.raw(with_crc("AIN24:24.28;SAFE:0;" + earlier));
     EXPECT_EQ(each.states.back().raw.analog_cv[0], 2428) << "this is the newest state";
-    EXPECT_EQ(each.states.back().safe, SafeReason::stop) << earlier_ms;
-    EXPECT_EQ(each.session.link().reason, SafeReason::stop) << earlier_ms;
+    EXPECT_EQ(each.states.back().safe, SafeReason::stop) << later_ms;
+    EXPECT_EQ(each.session.link().reason, SafeReason::stop) << later_ms;
   }
 }
 

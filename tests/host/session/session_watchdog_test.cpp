@@ -18,9 +18,8 @@ using SessionHold = ConnectedSession;
 TEST_F(SessionWatchdog, HoldsCommandsOfAProgramThatDoesNotFeed) {
   link.session.watchdog(300ms, link.now);
   const Time begin = link.now;
-  const Ticket lost =
-      // A call that waits for a board that does not answer.
-      link.session.send(turn_motor, 1s, link.now);
+  // A call that waits for a board that does not answer.
+  const Ticket lost = link.session.send(turn_motor, 1s, link.now);
   link.pass(400ms);
   const std::size_t sent = link.count('O');
   EXPECT_GT(sent, 3U);
@@ -36,17 +35,6 @@ TEST_F(SessionWatchdog, HoldsCommandsOfAProgramThatDoesNotFeed) {
   link.pass(100ms);
   EXPECT_GE(link.count('E'), 4U) << "a stop must always be sent";
   EXPECT_EQ(link.results.at(late).outcome, Outcome::cancelled);
-}
-
-TEST_F(SessionWatchdog, FeedAfterExpiryRestoresControl) {
-  link.session.watchdog(100ms, link.now);
-  link.pass(200ms);
-  link.heartbeat();
-  EXPECT_FALSE(link.session.link().in_control);
-  link.session.feed(link.now);
-  EXPECT_TRUE(link.session.link().in_control);
-  link.session.send(turn_motor, 1s, link.now);
-  EXPECT_EQ(link.count('O'), 1U);
 }
 
 TEST_F(SessionHold, HoldsHeartbeatsAndCommandsButSendsStops) {
@@ -112,18 +100,11 @@ TEST_F(NewSession, ReportsWhenTheBoardTakesCommands) {
   link.executed(link.last('F').pnum);
   EXPECT_TRUE(link.session.link().in_control);
   EXPECT_TRUE(link.links.back().in_control) << "on_link must report it";
+  link.executed(1);
+  link.heartbeat();
+  EXPECT_EQ(link.links.size(), 2U) << "each change must be reported once";
   EXPECT_EQ(explain("board", link.session.link()).reason,
             "the board is active and accepts our commands");
-}
-
-TEST_F(SessionLink, ReportsThatTheTransportIsDown) {
-  link.session.on_transport(0, false, link.now);
-  EXPECT_TRUE(link.session.link().causes.has(LinkCause::transport_down));
-  const Problem problem = explain("board", link.session.link());
-  EXPECT_TRUE(contains(problem.reason, "transport is down"));
-  EXPECT_FALSE(problem.fix.empty());
-  link.session.on_transport(0, true, link.now);
-  EXPECT_FALSE(link.session.link().causes.has(LinkCause::transport_down));
 }
 
 TEST_F(SessionLink, ReportsLateFramesOnlyWhileTheBoardIsHeard) {
@@ -165,14 +146,6 @@ TEST(Explain, AdvisesToCutThePowerForAnUnconfirmedStop) {
   const Problem drives = explain(Command::stop(), unheard, link);
   EXPECT_TRUE(contains(drives.reason, "reports no stop"));
   EXPECT_TRUE(drives.fix.starts_with("CUT THE POWER"));
-}
-
-TEST(Texts, ToTextNamesOutcomesAndCarrierEvents) {
-  EXPECT_STREQ(to_text(Outcome::confirmed), "confirmed");
-  EXPECT_STREQ(to_text(Outcome::timed_out), "timed out");
-  EXPECT_STREQ(to_text(CarrierEvent::Kind::up), "up");
-  EXPECT_STREQ(to_text(CarrierEvent::Kind::down), "down");
-  EXPECT_STREQ(to_text(CarrierEvent::Kind::warning), "warning");
 }
 
 }  // namespace

@@ -70,8 +70,6 @@ class ShareHolderTest : public SharedTransportTest {
     pollfd state{connection.get(), 0, 0};
     return ::poll(&state, 1, 0) == 1;
   }
-
-  const std::string stop = datagram_of("E", "STOP");
 };
 
 TEST_F(ShareHolderTest, DropsStatesForASleepingProgramAndLaterSendsTheNewest) {
@@ -113,10 +111,7 @@ TEST_F(ShareHolderTest, DisconnectsAProgramThatMissesAnEventOfTheTransport) {
 
 TEST_F(ShareHolderTest, PassesOnlyStopsToTheBoard) {
   const auto holder = opened(BoardRole::control);
-  struct Case {
-    Letter kind;
-    std::string text;
-  };
+  using Case = std::pair<Letter, std::string>;
   for (const auto& [kind, text] : {
            Case{Letter::received, "SAFE:0;"},
            Case{Letter::sent, "O:358,1,1;"},

@@ -20,23 +20,10 @@ using namespace std::chrono_literals;
 
 class SharedCarrier : public SharedTransportTest {
  protected:
-  const std::string stop = datagram_of("E", "STOP");
   const Problem unplugged{ErrorKind::open, "device:", "unplugged", "plug it in again"};
   const std::string silent =
       fmt::format("the program that has it open (pid {}) does not answer", ::getpid());
 };
-
-TEST_F(SharedCarrier, IsHeldByTheFirstProgramUntilItCloses) {
-  const auto only = opened_in(io, BoardRole::control);
-  EXPECT_TRUE(only->carrier->up());
-  EXPECT_EQ(only->carrier->name(), "device:");
-  EXPECT_EQ(only->carrier->send("hello", Priority::normal), SendResult::sent);
-  EXPECT_EQ(device.sent, std::vector<std::string>{"hello"});
-  EXPECT_TRUE(all_hear("answer", only));
-  only->carrier->close();
-  EXPECT_EQ(device.open, nullptr);
-  EXPECT_FALSE(connect_to_holder(share, BoardRole::control));
-}
 
 TEST_F(SharedCarrier, WatchersHearBothDirections) {
   const auto driver = opened(BoardRole::control);

@@ -19,6 +19,7 @@
 #include "../recorder.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/messages/datagram_writer.hpp"
+#include "tests/support/carriers.hpp"
 #include "transports/file_descriptor.hpp"
 #include "transports/share/shared_carrier.hpp"
 
@@ -40,7 +41,7 @@ struct Device {
   void report(const CarrierEvent& event);
 };
 
-class Device::Port final : public Carrier {
+class Device::Port final : public IdleCarrier {
  public:
   Port(asio::io_context& io, Device& device, Claim claim)
       : io_(io), device_(device), claim_(std::move(claim)) {}
@@ -51,18 +52,16 @@ class Device::Port final : public Carrier {
     if (device_.exclusive && device_.open != nullptr) {
       Port* const other = device_.open;
       if (!device_.may_be_taken || !claim_->takes || !other->claim_->yields)
-        throw Error(ErrorKind::open, name_, "in use", "end the other");
+        throw Error(ErrorKind::open, url_, "in use", "end the other");
       asio::post(other->io_, [other] { other->lose(); });
     }
     device_.open = this;
     ++device_.opened;
     handler_ = &handler;
-    up_ = true;
-    handler.on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+    handler.on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, url_, "", ""}});
   }
   void close() noexcept override {
     handler_ = nullptr;
-    up_ = false;
     if (device_.open == this) device_.open = nullptr;
   }
   SendResult send(std::string_view bytes, Priority, Peer) override {
@@ -70,9 +69,7 @@ class Device::Port final : public Carrier {
     if (device_.then_sent) device_.then_sent();
     return SendResult::sent;
   }
-  bool up() const override { return up_; }
-  const std::string& name() const override { return name_; }
-  const CarrierCounters& counters() const override { return counters_; }
+  const std::string& name() const override { return url_; }
 
  private:
   friend Device;
@@ -85,11 +82,8 @@ class Device::Port final : public Carrier {
 
   asio::io_context& io_;
   Device& device_;
-  const std::string name_ = "device:";
-  Handler* handler_ = nullptr;
-  bool up_ = false;
+  const std::string url_ = "device:";
   const Claim claim_;
-  CarrierCounters counters_;
 };
 
 inline void Device::deliver(const std::string& datagram) {
@@ -199,6 +193,7 @@ class SharedTransportTest : public testing::Test {
   asio::io_context io;
   Device device;
   ShareName share{next_name()};
+  const std::string stop = datagram_of("E", "STOP");
 };
 
 }  // namespace r4::test

@@ -8,8 +8,6 @@
 #include <asio/ip/udp.hpp>
 #include <fstream>
 #include <future>
-#include <optional>
-#include <thread>
 #include <vector>
 
 #include "../recorder.hpp"
@@ -37,10 +35,12 @@ class Socket {
     socket_.non_blocking(true);
   }
   std::string port() const { return std::to_string(socket_.local_endpoint().port()); }
+  // From now on the socket receives only from there, as a host receives from its board.
+  void connect(const std::string& port, const char* address) {
+    socket_.connect(endpoint(port, address));
+  }
   void send(std::string_view text, const std::string& port, const char* address = "127.0.0.1") {
-    socket_.send_to(asio::buffer(text),
-                    udp::endpoint(asio::ip::make_address(address),
-                                  static_cast<unsigned short>(std::stoi(port))));
+    socket_.send_to(asio::buffer(text), endpoint(port, address));
   }
   // Empty if nothing arrived.
   std::string receive() {
@@ -52,14 +52,16 @@ class Socket {
   }
 
  private:
+  static udp::endpoint endpoint(const std::string& port, const char* address) {
+    return {asio::ip::make_address(address), static_cast<unsigned short>(std::stoi(port))};
+  }
+
   udp::socket socket_;
 };
 
 class UdpCarrierTest : public testing::Test {
  protected:
-  void open_board(const std::string& query = "") {
-    board = open_carrier(io, "udp://127.0.0.1:0" + query, Role::board, at_board);
-  }
+  void open_board() { board = open_carrier(io, "udp://127.0.0.1:0", Role::board, at_board); }
   void open_host() {
     host =
         open_carrier(io, "udp://127.0.0.1:" + port_of(*board) + "?listen=0", Role::host, at_host);
@@ -102,103 +104,81 @@ TEST_F(UdpCarrierTest, CarriesBothWays) {
   }
 }
 
-// A socket that receives from one address only, as a host receives from its board.
-std::string answer_from(asio::io_context& io, const char* asked, const std::string& port,
-                        Carrier& board, const Recorder& at_board) {
-  udp::socket socket(io, udp::endpoint(udp::v4(), 0));
-  socket.non_blocking(true);
-  socket.connect(
-      udp::endpoint(asio::ip::make_address(asked), static_cast<unsigned short>(std::stoi(port))));
-  socket.send(asio::buffer(valid(asked)));
-  if (!run_until(io, [&] { return at_board.has(valid(asked)); })) return "nothing was heard";
-  board.send("for one", Priority::normal, at_board.datagrams.back().from);
-  board_end_of(board).hold(at_board.datagrams.back().from);
-  board.send("for all", Priority::state);
-  std::string all;
-  for (int i = 0; i < 2; ++i) {
-    std::array<char, 64> buffer{};
-    std::size_t size = 0;
-    asio::error_code error;
-    const bool came = run_until(io, [&] {
-      size = socket.receive(asio::buffer(buffer), 0, error);
-      return !error;
-    });
-    all += came ? std::string(buffer.data(), size) + ";" : "nothing;";
-  }
-  return all;
-}
-
 TEST_F(UdpCarrierTest, AnswersFromTheAddressOfTheQuestion) {
-  for (const char* const url : {"udp://0.0.0.0:0", "udp://[::]:0"}) {
+  for (const std::string& url : {std::string("udp://0.0.0.0:0"), std::string("udp://[::]:0")}) {
+    at_board = Recorder();
     board = open_carrier(io, url, Role::board, at_board);
     for (const char* const asked : {"127.0.0.1", "127.0.0.2", "127.0.0.3"}) {
-      EXPECT_EQ(answer_from(io, asked, port_of(*board), *board, at_board), "for one;for all;")
-          << url << ' ' << asked;
+      SCOPED_TRACE(url + ' ' + asked);
+      Socket asker(io, "0.0.0.0");
+      asker.connect(port_of(*board), asked);
+      asker.send(valid(asked), port_of(*board), asked);
+      ASSERT_TRUE(wait_for(at_board, valid(asked)));
+      const Peer peer = at_board.datagrams.back().from;
+      board->send("for one", Priority::normal, peer);
+      board_end_of(*board).hold(peer);
+      board->send("for all", Priority::state);
+      EXPECT_TRUE(run_until(io, [&] { return asker.receive() == "for one"; }));
+      EXPECT_TRUE(run_until(io, [&] { return asker.receive() == "for all"; }));
     }
-    at_board.datagrams.clear();
   }
 }
 
-TEST_F(UdpCarrierTest, ServesIpv4HostsOnAnIpv6Socket) {
-  Socket peer(io, "127.0.0.1");
-  board = open_carrier(io, "udp://[::]:0?peer=127.0.0.1:" + peer.port(), Role::board, at_board);
-  EXPECT_EQ(board->send("state", Priority::state), SendResult::sent);
-  std::string received;
-  ASSERT_TRUE(run_until(io, [&] { return !(received = peer.receive()).empty(); }));
-  EXPECT_EQ(received, "state");
-  open_host();
-  host->send("question", Priority::normal);
-  ASSERT_TRUE(wait_for(at_board, "question"));
-}
-
-TEST_F(UdpCarrierTest, SendsStatesToTheHostHeardLast) {
+TEST_F(UdpCarrierTest, SendsStatesToTheControllingHostElseToTheHostHeardLast) {
   open_board();
   EXPECT_EQ(board->send("nobody is there", Priority::state), SendResult::down);
-  Recorder at_second;
-  open_host();
-  const auto second =
-      open_carrier(io, "udp://127.0.0.1:" + port_of(*board) + "?listen=0", Role::host, at_second);
-  host->send(valid("first"), Priority::normal);
-  ASSERT_TRUE(wait_for(at_board, valid("first")));
-  second->send(valid("second"), Priority::normal);
-  ASSERT_TRUE(wait_for(at_board, valid("second")));
+  Socket owner(io, "127.0.0.1");
+  Socket stranger(io, "127.0.0.1");
+  owner.send(valid("owner"), port_of(*board));
+  stranger.send(valid("stranger"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("stranger")));
   const Peer first = at_board.datagrams[0].from;
   EXPECT_NE(first, at_board.datagrams[1].from);
   EXPECT_NE(first, everyone);
-  board->send("for everyone", Priority::state);
-  board->send("for the first", Priority::normal, first);
-  ASSERT_TRUE(wait_for(at_second, "for everyone"));
-  ASSERT_TRUE(wait_for(at_host, "for the first"));
-  EXPECT_EQ(at_host.datagrams.size(), 1U);
-  EXPECT_EQ(at_second.datagrams.size(), 1U);
   EXPECT_EQ(board->send("an unknown peer", Priority::normal, first + 100), SendResult::down);
   EXPECT_EQ(board->counters().tx_dropped, 2U);
-  EXPECT_TRUE(board->up());
+  board->send("for everyone", Priority::state);
+  board->send("for the first", Priority::normal, first);
+  EXPECT_TRUE(run_until(io, [&] { return stranger.receive() == "for everyone"; }));
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "for the first"; }));
+
+  board_end_of(*board).hold(first);
+  stranger.send(valid("later"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("later")));
+  board->send("state", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "state"; }));
+  EXPECT_EQ(stranger.receive(), "");
+
+  board_end_of(*board).hold(everyone);  // the host loses control
+  stranger.send(valid("again"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("again")));
+  board->send("for anybody", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return stranger.receive() == "for anybody"; }));
+  EXPECT_EQ(owner.receive(), "");
 }
 
 TEST_F(UdpCarrierTest, AnswersThePaperClientOnBothOfItsPorts) {
-  Socket listening(io, "127.0.0.1");
-  Socket asking(io, "127.0.0.1");
-  open_board("?peer=127.0.0.1:" + listening.port());
-  asking.send(valid("command"), port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, valid("command")));
-  const Peer peer = at_board.datagrams[0].from;
-  board->send("state", Priority::state);
-  board->send("answer", Priority::normal, peer);
-  std::vector<std::string> heard;
-  ASSERT_TRUE(run_until(io, [&] {
-    if (std::string text = listening.receive(); !text.empty()) heard.push_back(text);
-    return heard.size() == 2;
-  }));
-  EXPECT_EQ(heard, (std::vector<std::string>{"state", "answer"}));
-  EXPECT_EQ(asking.receive(), "answer");
-  EXPECT_EQ(asking.receive(), "");
+  for (const std::string& url : {std::string("udp://127.0.0.1:0"), std::string("udp://[::]:0")}) {
+    SCOPED_TRACE(url);
+    Socket listening(io, "127.0.0.1");
+    Socket asking(io, "127.0.0.1");
+    at_board = Recorder();
+    board = open_carrier(io, url + "?peer=127.0.0.1:" + listening.port(), Role::board, at_board);
+    asking.send(valid("command"), port_of(*board));
+    ASSERT_TRUE(wait_for(at_board, valid("command")));
+    EXPECT_EQ(board->send("state", Priority::state), SendResult::sent);
+    board->send("answer", Priority::normal, at_board.datagrams[0].from);
+    EXPECT_TRUE(run_until(io, [&] { return listening.receive() == "state"; }));
+    EXPECT_TRUE(run_until(io, [&] { return listening.receive() == "answer"; }));
+    EXPECT_EQ(asking.receive(), "answer");
+    EXPECT_EQ(asking.receive(), "");
 
-  listening.send(valid("from-the-peer-itself"), port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, valid("from-the-peer-itself")));
-  board->send("once", Priority::normal, at_board.datagrams[1].from);
-  ASSERT_TRUE(run_until(io, [&] { return listening.receive() == "once"; }));
-  EXPECT_EQ(listening.receive(), "");
+    listening.send(valid("from-the-peer-itself"), port_of(*board));
+    ASSERT_TRUE(wait_for(at_board, valid("from-the-peer-itself")));
+    board->send("once", Priority::normal, at_board.datagrams[1].from);
+    EXPECT_TRUE(run_until(io, [&] { return listening.receive() == "once"; }));
+    EXPECT_EQ(listening.receive(), "");
+  }
 }
 
 TEST_F(UdpCarrierTest, HearsOnlyTheBoardFromAnyOfItsPorts) {
@@ -235,31 +215,6 @@ TEST_F(UdpCarrierTest, DropsTooLongDatagramsAndReportsTheirBeginning) {
   EXPECT_EQ(board->counters().rx_oversize, 2U);
   EXPECT_EQ(host->counters().rx_oversize, 1U);
   EXPECT_EQ(host->counters().tx_errors, 1U);
-}
-
-TEST_F(UdpCarrierTest, SendsStatesToTheControllingHostNotToTheHostHeardLast) {
-  open_board();
-  Socket owner(io, "127.0.0.1");
-  Socket stranger(io, "127.0.0.1");
-  owner.send(valid("owner"), port_of(*board));
-  stranger.send(valid("stranger"), port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, valid("stranger")));
-  board_end_of(*board).hold(at_board.datagrams[0].from);
-  board->send("state", Priority::state);
-  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "state"; }));
-
-  stranger.send(valid("later"), port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, valid("later")));
-  board->send("another state", Priority::state);
-  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "another state"; }));
-  EXPECT_EQ(stranger.receive(), "");
-
-  board_end_of(*board).hold(everyone);  // the host loses control
-  stranger.send(valid("again"), port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, valid("again")));
-  board->send("for anybody", Priority::state);
-  EXPECT_TRUE(run_until(io, [&] { return stranger.receive() == "for anybody"; }));
-  EXPECT_EQ(owner.receive(), "");
 }
 
 TEST_F(UdpCarrierTest, SaysWhyItCannotBeOpened) {
@@ -311,24 +266,6 @@ TEST_F(UdpCarrierTest, SaysThatAPortIsNotPermitted) {
   int first_free = 1024;
   limit >> first_free;
   EXPECT_EQ(status, first_free > 1 ? 0 : 1);
-}
-
-TEST_F(UdpCarrierTest, StaysUpIfTheBoardIsOff) {
-  std::string port;
-  {
-    Socket gone(io, "127.0.0.1");
-    port = gone.port();
-  }
-  host = open_carrier(io, "udp://127.0.0.1:" + port + "?listen=0", Role::host, at_host);
-  for (int i = 0; i < 20; ++i) {
-    EXPECT_EQ(host->send("is anybody there", Priority::normal), SendResult::sent);
-    run_for(io, std::chrono::milliseconds(1));
-  }
-  EXPECT_TRUE(host->up());
-  EXPECT_EQ(at_host.events.size(), 1U);
-  board = open_carrier(io, "udp://127.0.0.1:" + port, Role::board, at_board);
-  host->send("now", Priority::normal);
-  EXPECT_TRUE(wait_for(at_board, "now"));
 }
 
 TEST_F(UdpCarrierTest, DeliversABurstAndReportsItsEnd) {
@@ -393,31 +330,25 @@ class UdpTwoBoardsTest : public testing::Test {
   void open_host(Link& link) { link.host = open_carrier(io, url(link), Role::host, link.at_host); }
   // Both hosts send `count` questions at once. Each host receives the answers to its own questions.
   void talk(const std::string& name, int count) {
-    const std::size_t before[] = {links[0].at_host.datagrams.size(),
-                                  links[1].at_host.datagrams.size()};
+    std::vector<std::string> answers[2];
+    for (Link& link : links) link.at_host.datagrams.clear();
     for (int i = 0; i < count; ++i) {
-      for (std::size_t which : {0U, 1U}) {
-        links[which].host->send(question(name, which, i), Priority::normal);
+      for (const std::size_t which : {0U, 1U}) {
+        const std::string question = valid(fmt::format("{}{}x{}", name, which, i));
+        answers[which].push_back("answer to " + question);
+        links[which].host->send(question, Priority::normal);
       }
     }
-    for (std::size_t which : {0U, 1U}) {
-      const Recorder& heard = links[which].at_host;
-      ASSERT_TRUE(run_until(io, [&] {
-        return heard.datagrams.size() >= before[which] + static_cast<std::size_t>(count);
-      })) << name;
+    for (const std::size_t which : {0U, 1U}) {
+      const auto& heard = links[which].at_host.datagrams;
+      ASSERT_TRUE(run_until(io, [&] { return heard.size() >= answers[which].size(); })) << name;
     }
     run_for(io, std::chrono::milliseconds(1));
-    for (std::size_t which : {0U, 1U}) {
-      const Recorder& heard = links[which].at_host;
-      ASSERT_EQ(heard.datagrams.size(), before[which] + static_cast<std::size_t>(count)) << name;
-      for (int i = 0; i < count; ++i) {
-        EXPECT_EQ(heard.datagrams[before[which] + static_cast<std::size_t>(i)].text,
-                  "answer to " + question(name, which, i));
-      }
+    for (const std::size_t which : {0U, 1U}) {
+      std::vector<std::string> texts;
+      for (const auto& each : links[which].at_host.datagrams) texts.push_back(each.text);
+      EXPECT_EQ(texts, answers[which]) << name;
     }
-  }
-  static std::string question(const std::string& name, std::size_t which, int i) {
-    return valid(name + std::to_string(which) + "x" + std::to_string(i));
   }
 
   asio::io_context io;
@@ -523,25 +454,24 @@ TEST_F(UdpTwoBoardsTest, KeepThePortFromOtherPrograms) {
   EXPECT_FALSE(tries_to_share("0.0.0.0"));
 }
 
-// The system reports to a connected socket that its board is off. The report must not cost a
-// datagram.
-TEST_F(UdpTwoBoardsTest, TheFirstLosesNothingIfTheSecondIsOff) {
-  open_board(links[0], "127.0.0.1");
-  open_host(links[0]);
-  const std::string port = Socket(io, "127.0.0.1").port();
-  Link& off = links[1];
-  off.host =
-      open_carrier(io, "udp://127.0.0.1:" + port + "?listen=" + listen, Role::host, off.at_host);
-  for (int i = 0; i < 5; ++i) {
+// The second host has a connected socket. The system reports to this socket that the board is off,
+// which must not cost a datagram.
+TEST_F(UdpTwoBoardsTest, AHostStaysUpAndLosesNothingIfItsBoardIsOff) {
+  for (Link& off : links) {
+    const std::string port = Socket(io, "127.0.0.1").port();
+    off.host =
+        open_carrier(io, "udp://127.0.0.1:" + port + "?listen=" + listen, Role::host, off.at_host);
+    for (int i = 0; i < 5; ++i) {
+      EXPECT_EQ(off.host->send("is anybody there", Priority::normal), SendResult::sent);
+      run_for(io, std::chrono::milliseconds(1));
+    }
     EXPECT_EQ(off.host->send("is anybody there", Priority::normal), SendResult::sent);
-    run_for(io, std::chrono::milliseconds(1));
+    EXPECT_TRUE(off.host->up());
+    off.board = open_carrier(io, "udp://127.0.0.1:" + port, Role::board, off.at_board);
+    EXPECT_EQ(off.host->send("now", Priority::normal), SendResult::sent);
+    EXPECT_TRUE(run_until(io, [&] { return off.at_board.has("now"); }));
+    EXPECT_EQ(off.at_host.events.size(), 1U);
   }
-  EXPECT_EQ(off.host->send("is anybody there", Priority::normal), SendResult::sent);
-  EXPECT_TRUE(off.host->up());
-  off.board = open_carrier(io, "udp://127.0.0.1:" + port, Role::board, off.at_board);
-  EXPECT_EQ(off.host->send("now", Priority::normal), SendResult::sent);
-  EXPECT_TRUE(run_until(io, [&] { return off.at_board.has("now"); }));
-  EXPECT_EQ(off.at_host.events.size(), 1U);
 }
 
 // Each host has a loop and a thread, as in r4::Board.

@@ -35,7 +35,6 @@ class ModelledController {
   // Moves frames from the sockets to the controller while the controller has room.
   void pump();
   std::size_t waiting() const { return bus_.waiting(node_); }
-  const ControllerOptions& options() const { return options_; }
 
  private:
   CanBusModel& bus_;

@@ -69,22 +69,21 @@ class AnsweringBoards {
 
   std::uint16_t port() const { return port_; }
 
-  // A short search at the addresses of these boards and of `others`.
-  BoardSearch search(const std::vector<std::string>& others = {}) {
+  // A short search at 127.0.<place> of each place. Without places: at the addresses of these boards.
+  BoardSearch search(std::vector<std::string> places = {}) {
+    const auto add_all = [&] {
+      for (const auto& [address, board] : boards_) places.push_back(address);
+    };
+    if (places.empty()) on_thread(add_all);
+    std::vector<BoardSearch::Network> networks;
+    for (const std::string& place : places) {
+      networks.push_back({"lo", 0, asio::ip::address_v4::loopback(),
+                          asio::ip::make_address_v4("127.0." + place), ""});
+    }
     BoardSearch search;
     search.port = port_;
     search.between = std::chrono::milliseconds(20);
     search.patience = std::chrono::milliseconds(200);
-    std::vector<BoardSearch::Network> networks;
-    const auto add_network = [&](const std::string& address) {
-      networks.push_back({"lo" + std::to_string(networks.size()), 0,
-                          asio::ip::address_v4::loopback(),
-                          asio::ip::make_address_v4("127.0." + address), ""});
-    };
-    on_thread([&] {
-      for (const auto& [address, board] : boards_) add_network(address);
-    });
-    for (const std::string& address : others) add_network(address);
     search.networks = [networks] { return networks; };
     return search;
   }

@@ -40,30 +40,26 @@ TEST(BoardSearch, ReportsTheAnswerAndTheAddressOfEachBoard) {
   boards.add("0.3", {identity("two", "BUSY:0;")});
   boards.add("0.4", {identity("old")});
   const BoardSearch::Result found = boards.search().run();
-  ASSERT_EQ(ids(found), (std::vector<std::string>{"old", "one", "two"}));
   EXPECT_FALSE(found.more);
+  std::vector<std::string> answers;
   for (const AnsweredBoard& each : found.boards) {
     EXPECT_EQ(each.firmware, "0.1.0");
     EXPECT_EQ(each.capabilities, "udp");
     EXPECT_EQ(each.heard_at.to_string(), "127.0.0.1");
-    if (each.board_id == "one") {
-      EXPECT_EQ(each.address.to_string(), "127.0.0.2");
-      EXPECT_EQ(each.name, "left");
-      EXPECT_EQ(each.busy, true);
-    } else if (each.board_id == "two") {
-      EXPECT_EQ(each.name, "");
-      EXPECT_EQ(each.busy, false);
-    } else {
-      EXPECT_FALSE(each.busy) << "the answer does not include BUSY";
-    }
+    const std::string busy = !each.busy ? "without BUSY" : *each.busy ? "busy" : "free";
+    answers.push_back(each.board_id + " at " + each.address.to_string() + ' ' + each.name + ' ' +
+                      busy);
   }
+  std::sort(answers.begin(), answers.end());
+  EXPECT_EQ(answers,
+            (std::vector<std::string>{"old at 127.0.0.4  without BUSY",
+                                      "one at 127.0.0.2 left busy", "two at 127.0.0.3  free"}));
 }
 
 TEST(BoardSearch, FindsABoardAfterTwoLostQuestions) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("late")}, 3);
-  const BoardSearch search = boards.search();
-  EXPECT_EQ(ids(search.run()), std::vector<std::string>{"late"});
+  EXPECT_EQ(ids(boards.search().run()), std::vector<std::string>{"late"});
   EXPECT_EQ(boards.asked("0.2"), 3);
 }
 
@@ -130,9 +126,8 @@ TEST(BoardSearch, KeepsTheFirstAnswerOfEachAddressAndEndsInTime) {
   std::vector<std::string> answers(20000, identity("flood"));
   answers.front() = identity("first");
   boards.add("0.2", answers);
-  const BoardSearch search = boards.search();
   const auto begun = Clock::now();
-  EXPECT_EQ(ids(search.run()), std::vector<std::string>{"first"});
+  EXPECT_EQ(ids(boards.search().run()), std::vector<std::string>{"first"});
   EXPECT_LT(Clock::now() - begun, std::chrono::seconds(2));
 }
 
@@ -167,15 +162,6 @@ TEST(BoardSearch, ReportsWhyItCannotAsk) {
   ASSERT_TRUE(none.problem);
   EXPECT_NE(none.problem->reason.find("nothing can be sent (gone0: "), std::string::npos)
       << none.problem->reason;
-}
-
-TEST(BoardSearch, IncludesTheLoopbackOfThisComputer) {
-  const auto networks = BoardSearch::networks_of_this_computer();
-  const bool has_loopback =
-      std::any_of(networks.begin(), networks.end(), [](const BoardSearch::Network& network) {
-        return network.from == asio::ip::address_v4::loopback() && network.to == network.from;
-      });
-  EXPECT_TRUE(has_loopback);
 }
 
 TEST(FindBoard, ListsSeveralBoardsWithTheirUrls) {
