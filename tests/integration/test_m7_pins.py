@@ -121,5 +121,4 @@ def test_streams_at_exactly_100_hz_for_20_seconds_with_nothing_lost(streamed):
     states = streamed()
     steps = steps_of(states, 10)
     left_out = states[-1]['fields']['LATE'] - states[0]['fields']['LATE']
-    # On an idle machine no state is left out. Beside compilers QEMU is slower, and a twentieth is left out.
-    assert 10 * left_out <= within_ms(10 * len(steps) / 10)
+    assert 10 * left_out <= within_ms(10 * len(steps) / 50)  # an idle machine leaves no state out
