@@ -244,7 +244,7 @@ void BridgedPair::on_lease(const Datagram& datagram, Peer from, Time now) {
     case Watchers::Effect::watching:
       return watch_.wish(datagram.command().values());
     case Watchers::Effect::unproven: {
-      const std::uint32_t token = random_() | 1U;  // not 0, which is the T of a first W
+      const std::uint32_t token = std::max(random_(), 1U);  // 0 is the T of a first W
       watchers_.tell(watcher, token, ms_of(now));
       return answer(datagram, Refusal::stale, token, from, now);
     }

@@ -187,7 +187,7 @@ inline void Datagram::Iterator::load() {
 }
 
 // Checks one datagram, with or without a terminator, and on success makes `out` a view of it.
-// Otherwise `out` is unchanged or empty.
+// Otherwise `out` is unchanged.
 // `syntax` also for a PNum (32 bit) or T (64 bit) that is not a whole number in range. `syntax`
 // also for a SID that is 0 or not 16 hexadecimal digits, and for a duplicate PNum, T or SID.
 R4LINK_API ReadResult read_datagram(Text bytes, Datagram& out);

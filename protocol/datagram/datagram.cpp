@@ -190,15 +190,17 @@ ReadResult read_datagram(Text bytes, Datagram& out) {
     return fail(ReadError::crc, trailer.digits);
   }
 
-  // Read in place, because copying a newly written datagram takes longer.
   const Text fields = between(whole.begin(), fields_end);
+  Datagram datagram;
   std::uint64_t short_names[Datagram::words];
-  const bool valid = mark_fields(fields, out.ends_, short_names);
-  out.facts_ = {whole, fields, 0, no_session, crc, 0, false, false, 0, Field()};
-  const char* const wrong = valid ? out.read_short_names(short_names) : first_wrong_byte(fields);
-  if (wrong == nullptr) return result;
-  out.facts_ = Datagram::Facts();
-  return fail(ReadError::syntax, wrong);
+  if (!mark_fields(fields, datagram.ends_, short_names)) {
+    return fail(ReadError::syntax, first_wrong_byte(fields));
+  }
+  datagram.facts_ = {whole, fields, 0, no_session, crc, 0, false, false, 0, Field()};
+  const char* const wrong = datagram.read_short_names(short_names);
+  if (wrong != nullptr) return fail(ReadError::syntax, wrong);
+  out = datagram;
+  return result;
 }
 
 }  // namespace r4

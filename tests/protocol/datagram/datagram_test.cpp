@@ -185,12 +185,21 @@ TEST(Datagram, OnlyPNumAndTNameThePacketNumberAndTheTime) {
 }
 
 TEST(Datagram, ARefusedLineLeavesTheResultUnchanged) {
-  const std::string good = captured_state();
-  Datagram datagram;
-  ASSERT_TRUE(read_datagram(good, datagram));
-  EXPECT_FALSE(read_datagram(std::string("A:1;^0x1^"), datagram));
-  EXPECT_EQ(str(datagram.bytes()), good);
-  EXPECT_EQ(datagram.pnum(), 7434U);
+  const std::string good = with_crc("O:358,1,1;PNum:1;");
+  std::string damaged = with_crc("O:100,1,2;PNum:2;");
+  damaged[2] = '9';
+  for (const std::string& refused :
+       {std::string(), std::string(2000, 'O'), std::string("O:100,1,2;PNum:2;"), damaged,
+        with_crc("O:100,1,2;PNum"), with_crc("O:100,1,2;PNum:2;PNum:2;"),
+        with_crc("O:100,1,2;PNum:2;SID:0;"), with_crc("O:100,1,2;PNum:2;T:x;")}) {
+    Datagram datagram;
+    ASSERT_TRUE(read_datagram(good, datagram));
+    EXPECT_FALSE(read_datagram(refused, datagram)) << refused;
+    EXPECT_EQ(str(datagram.bytes()), good) << refused;
+    EXPECT_EQ(str(datagram.command().values()), "358,1,1") << refused;
+    EXPECT_EQ(fields_of(datagram), (std::vector<std::string>{"O:358,1,1", "PNum:1"})) << refused;
+    EXPECT_EQ(datagram.pnum(), 1U) << refused;
+  }
 }
 
 TEST(Datagram, ReadsASingleFieldFromText) {
