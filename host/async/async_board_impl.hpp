@@ -55,7 +55,6 @@ struct AsyncBoard::Impl final : std::enable_shared_from_this<AsyncBoard::Impl> {
   enum class Phase : std::uint8_t { made, open, leaving, closed };
   bool is_open() const { return phase == Phase::open; }
   bool has_link() const { return phase == Phase::open || phase == Phase::leaving; }
-  bool reports() const { return phase == Phase::made || phase == Phase::open; }
 
   // Throws Error{usage} for no transport, and for more than Session::most_paths.
   Impl(asio::io_context& context, std::vector<std::unique_ptr<Carrier>> transports,
