@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Why the outputs are safe: causes, each latched until its own end (docs/reference/safety.md).
 //     cause      enters                                   leaves                      setpoints
-//     link       host silent, or its transport failed     the host reconnects         kept
+//     link       no host is in control: at boot, after    a host takes control        kept
+//                its silence, farewell or lost paths
 //     handle     dead-man's handle released               handle held again            cleared
 //     proximity  obstacle nearer than a threshold, or     5 cm beyond it for 500 ms,  cleared
 //                a sensor with a threshold is blind       or threshold off
@@ -47,7 +48,7 @@ class Safety {
   static std::uint8_t bit(SafeReason cause) {
     return static_cast<std::uint8_t>(1U << static_cast<unsigned>(cause));
   }
-  std::uint8_t causes_ = 0;
+  std::uint8_t causes_ = bit(SafeReason::link);
   std::int32_t newest_ = 0;
 };
 

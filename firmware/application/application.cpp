@@ -62,7 +62,7 @@ void Application::start(std::uint32_t now_ms) {
   tell_ports();
   begin_devices(now_ms);
   if (observer_ != nullptr) {
-    observer_->on_state(now_ms, BoardState::connecting, SafeReason::none);
+    observer_->on_state(now_ms, BoardState::connecting, SafeReason::link);
     observer_->on_outputs(now_ms, outputs_);
   }
   poll(now_ms);

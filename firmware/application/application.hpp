@@ -156,7 +156,6 @@ class Application {
   void answer_heartbeat(Source to, std::uint32_t now_ms);
   void send_heartbeat(Source to, std::uint32_t now_ms);
   void write_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t t_ms, const SafeReport& safe);
-  SafeReport shown_to_watchers() const;
   void send_states(std::uint32_t now_ms);
   void send_state(Source to, std::uint32_t& pnum, FieldSet fields, const State& state,
                   std::uint32_t t_ms);
@@ -193,7 +192,7 @@ class Application {
   std::uint8_t port_count_ = 0;
   bool any_behind_ = false;  // may be true when no port is behind
   BoardState reported_state_ = BoardState::connecting;
-  SafeReason reported_reason_ = SafeReason::none;
+  SafeReason reported_reason_ = SafeReason::link;
   std::uint32_t turned_ms_ = 0;
   std::uint32_t went_on_ms_ = 0;   // the first turn after a standstill
   std::uint32_t obstacle_ms_ = 0;  // when an obstacle was last seen

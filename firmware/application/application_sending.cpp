@@ -103,9 +103,10 @@ void Application::identify(Source to, const Datagram& question, bool with_wiring
 // `at`: the command of a group, from 1; 0: none. `lease`: the number that a W must echo; 0: none.
 void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
                          std::uint8_t at, std::uint32_t lease) {
-  if (!known_) ++rx_refused_;
+  const bool counts = !known_ && lease == 0;  // with a lease, the board only asks for another W
+  if (counts) ++rx_refused_;
   if (!datagram.has_pnum()) return;
-  if (observer_ != nullptr && !known_) observer_->on_refused(now_ms, datagram.pnum(), code);
+  if (observer_ != nullptr && counts) observer_->on_refused(now_ms, datagram.pnum(), code);
   Nack nack;
   nack.pnum = datagram.pnum();
   nack.sid = datagram.session_id();
@@ -142,7 +143,7 @@ void Application::send_heartbeats(std::uint32_t now_ms) {
   }
   for (Watcher& watcher : watchers_) {
     if (watcher.period_ms != 0 && !reaches(watcher.at)) {
-      write_heartbeat(watcher.at, watcher.pnum, heartbeat_time(now_ms), shown_to_watchers());
+      write_heartbeat(watcher.at, watcher.pnum, heartbeat_time(now_ms), safe_report());
     }
   }
   link_.heartbeat_sent(heartbeat_time(now_ms));
@@ -153,18 +154,19 @@ void Application::answer_heartbeat(Source to, std::uint32_t now_ms) {
   write_heartbeat(to, number_for(to), link_.answer_time(heartbeat_time(now_ms)), safe_report());
 }
 
-// In CONNECTING the heartbeat has PNum 0, and packet numbers restart after it.
+// In CONNECTING the heartbeat is the paper's: PNum 0, without SAFE:1. Numbers restart after it.
 void Application::send_heartbeat(Source to, std::uint32_t now_ms) {
   std::uint32_t& pnum = ports_[to.port].next_pnum;
   if (link_.state() != BoardLinkState::connecting) {
     return write_heartbeat(to, pnum, heartbeat_time(now_ms), safe_report());
   }
   char buffer[short_datagram];
+  SafeReport safe = safe_report();
+  if (safe.reason == SafeReason::link) safe = SafeReport();
   const Text nonce = authentication_.nonce();
   const std::uint32_t t_ms = nonce.empty() ? 0 : heartbeat_time(now_ms);
-  ports_[to.port].port->send(
-      write_board_heartbeat(buffer, sizeof buffer, 0, t_ms, safe_report(), nonce), Priority::normal,
-      to.peer);
+  ports_[to.port].port->send(write_board_heartbeat(buffer, sizeof buffer, 0, t_ms, safe, nonce),
+                             Priority::normal, to.peer);
   pnum = 1;
 }
 
@@ -176,13 +178,6 @@ void Application::write_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t 
   link_.shown(t_ms);
   transmit(to, pnum, write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safe, nonce),
            Priority::normal);
-}
-
-// A board that has had no host reports `link` to watchers, like a board that has lost its host.
-SafeReport Application::shown_to_watchers() const {
-  SafeReport report = safe_report();
-  if (report.reason == SafeReason::none && !link_.has_owner()) report.reason = SafeReason::link;
-  return report;
 }
 
 void Application::send_states(std::uint32_t now_ms) {
@@ -202,8 +197,6 @@ void Application::send_states(std::uint32_t now_ms) {
       to.peer = audience(i);
       send_state(to, ports_[i].next_pnum, chosen, state, t_ms);
     }
-  } else if (state.safe == SafeReason::none) {
-    state.safe = SafeReason::link;
   }
   for (Watcher& watcher : watchers_) {
     if (watcher.period_ms == 0 || !watcher.take(t_ms)) continue;

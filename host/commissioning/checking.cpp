@@ -158,6 +158,10 @@ void Checking::make_ready() {
     board.wait_heard();
     const LinkStatus link = board.link();
     if (link.state == HostLinkState::active) return;
+    if (link.reason == SafeReason::link && tries != most_tries) {  // the board has yet to answer
+      collect(100ms);
+      continue;
+    }
     if (link.reason == SafeReason::handle && tries != most_tries) {
       require(Topic::handle_held, "Hold the dead-man's handle, and keep holding it.",
               "the handle is released");

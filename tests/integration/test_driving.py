@@ -80,7 +80,7 @@ def test_events_from_standard_input_happen_at_once():
         write('handle released')
         board.next(lambda each: each.get('reason') == 'handle')
         write('handle held')
-        board.next(lambda each: each.get('reason') == 'none')
+        board.next(lambda each: each.get('reason') == 'link')
         write('motor 1 stalled')
         board.next(lambda each: each.get('happened') == 'motor 1 stalled')
         assert run('send', board.host_url, 'R:1,On', 'O:4095,1,1', '--hold', '1').returncode == 0

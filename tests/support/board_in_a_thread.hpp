@@ -53,7 +53,7 @@ class BoardInAThread {
   std::condition_variable changed_;
   std::vector<std::string> executed_;
   firmware::BoardState state_ = firmware::BoardState::connecting;
-  SafeReason reason_ = SafeReason::none;
+  SafeReason reason_ = SafeReason::link;
   std::unique_ptr<sim::SimulatedBoard> board_;
   std::thread thread_;
 };

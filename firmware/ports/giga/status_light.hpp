@@ -22,10 +22,11 @@ class StatusLight {
     bool blue = false;
     switch (reason) {
       case SafeReason::none:
-        green = state == firmware::BoardState::active || flash;
+        green = true;
         break;
       case SafeReason::link:
-        blue = true;
+        green = state == firmware::BoardState::connecting && flash;
+        blue = state != firmware::BoardState::connecting;
         break;
       case SafeReason::handle:
       case SafeReason::proximity:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
-from ._core import RefusedPost
-from .enums import DisarmCause, EventKind, LinkState, PathState
+from ._core import LinkStatus, RefusedPost
+from .enums import DisarmCause, EventKind, LinkState, PathState, SafeReason
 
 if TYPE_CHECKING:
     from .board import Board
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 _logger = logging.getLogger('r4link')
 _logger.addHandler(logging.NullHandler())  # a program chooses where its logs go
 
-_LINK_LEVELS = {LinkState.SAFE: logging.WARNING, LinkState.LOST: logging.ERROR}
 _QUIET_PATHS = (PathState.ASKING, PathState.CARRYING)
 
 
@@ -30,13 +29,21 @@ def log_events(board: Board) -> None:
 
     board.on_event(lambda event: log(logging.INFO if event.kind is EventKind.UP else logging.WARNING, ': '.join(
         filter(None, (f'transport {event.kind}', event.reason, event.fix)))))
-    board.on_link(lambda link: log(_LINK_LEVELS.get(link.state, logging.INFO), f'link {link.state}' + ''.join(
+    board.on_link(lambda link: log(_level_of(link), f'link {link.state}' + ''.join(
         f', {each}' for each in ((link.reason,) if link.state is LinkState.SAFE else ()) + link.causes)))
     board.on_path(lambda path: log(logging.INFO if path.state in _QUIET_PATHS else logging.WARNING,
                                    f'path {path.name} {path.state}'))
     board.on_restart(lambda: log(logging.WARNING, 'the board has restarted'))
     board.on_arming(lambda cause: log(logging.INFO, 'armed' if cause is DisarmCause.NONE else f'not armed: {cause}'))
     board.on_refused(log_refusal)
+
+
+def _level_of(link: LinkStatus) -> int:
+    if link.state is LinkState.LOST:
+        return logging.ERROR
+    # While a program connects, the board may be safe for want of a host.
+    trouble = link.state is LinkState.SAFE and link.reason is not SafeReason.LINK
+    return logging.WARNING if trouble else logging.INFO
 
 
 def _printable(text: str) -> str:

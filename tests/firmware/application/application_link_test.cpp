@@ -43,6 +43,7 @@ TEST(ApplicationLink, AnswersAHostWithoutAnEchoOnlyOnItsPort) {
   EXPECT_EQ(heard[0].peer, 3U);
   EXPECT_EQ(heard[0].pnum, 1U);
   EXPECT_EQ(heard[0].t_ms, board.now_ms);
+  EXPECT_NE(heard[0].bytes.find(";SAFE:1;"), std::string::npos) << "also for watchers of a bus";
   EXPECT_EQ(board.state(), BoardState::connecting);
   EXPECT_TRUE(board.take(1).empty());
   host.heartbeat(board.now_ms);
@@ -63,7 +64,7 @@ TEST(ApplicationLink, StreamsAsSoonAsAHeartbeatStartsTheSession) {
   EXPECT_EQ(heard[1].kind, MessageKind::board_heartbeat);
   EXPECT_EQ(heard[1].pnum, 2U);
   EXPECT_EQ(heard[1].t_ms, board.now_ms);
-  EXPECT_EQ(board.log.states, (Lines{"CONNECTING none", "ACTIVE none"}));
+  EXPECT_EQ(board.log.states, (Lines{"CONNECTING link", "ACTIVE none"}));
 }
 
 TEST(ApplicationLink, AcceptsAPaperHeartbeatWithoutNumberOrTime) {
@@ -103,7 +104,7 @@ TEST(ApplicationLink, TheTimeoutAppliesBeforeALateHeartbeat) {
   board.application->drained(0);
   host.heartbeat(6);
   EXPECT_EQ(board.log.states,
-            (Lines{"CONNECTING none", "ACTIVE none", "SAFE link", "ACTIVE none"}));
+            (Lines{"CONNECTING link", "ACTIVE none", "SAFE link", "ACTIVE none"}));
   EXPECT_EQ(board.hal.made_safe, 2);
 }
 
@@ -295,7 +296,7 @@ TEST(ApplicationLink, RefusesAPortTooManyAndIgnoresItsDatagrams) {
   board.application->port_down(number, board.now_ms);
   board.run(600);
   EXPECT_EQ(board.state(), BoardState::connecting);
-  EXPECT_EQ(board.reason(), SafeReason::none);
+  EXPECT_EQ(board.reason(), SafeReason::link);
   EXPECT_TRUE(more.sent.empty());
   EXPECT_FALSE(board.take(firmware::Application::max_ports - 1).empty())
       << "the last port is served";
@@ -511,7 +512,7 @@ TEST(ApplicationLink, ServesThePapersPythonClient) {
     }
     board.run(1);
   }
-  EXPECT_EQ(board.log.states, (Lines{"CONNECTING none", "ACTIVE none"}));
+  EXPECT_EQ(board.log.states, (Lines{"CONNECTING link", "ACTIVE none"}));
   EXPECT_EQ(board.outputs().dhb12[2].pwm, 1000);
   EXPECT_EQ(board.outputs().servo_us[2], 1000);
   EXPECT_GT(board.log.executed.size(), 6900U);

@@ -65,6 +65,7 @@ TEST(ApplicationWatch, ABoardWithoutAHostStreamsToAWatcherAndStaysSafe) {
   TestWatcher watcher{board, Source{0, 9}};
   board.run(100);
   watcher.watch("50");
+  EXPECT_TRUE(board.log.refused.empty()) << "the board only asked for an echo";
   board.run(1000);
   const std::vector<Heard> heard = watcher.take();
   std::size_t states = 0;

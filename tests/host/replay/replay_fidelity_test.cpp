@@ -142,7 +142,7 @@ TEST(ReplayFidelity, HasTheSameStatesEventsAndStatisticsAsLive) {
   EXPECT_EQ(played.damaged, live.damaged);
   live.events.emplace_back("down the recording has ended");
   EXPECT_EQ(played.events, live.events);
-  EXPECT_EQ(live.links, (std::vector<std::string>{"active none", "safe stop"}));
+  EXPECT_EQ(live.links, (std::vector<std::string>{"safe link", "active none", "safe stop"}));
   live.links.emplace_back("lost stop");
   EXPECT_EQ(played.links, live.links);
   EXPECT_EQ(played.restarts, live.restarts);

@@ -105,7 +105,9 @@ bool CanNode::begin(Text datagram, std::uint32_t now_us) {
 void CanNode::note_reason(Text heartbeat) {
   Datagram datagram;
   if (!read_datagram(heartbeat, datagram)) return;
-  const SafeReason reason = heartbeat_reason(datagram);
+  SafeReason reason = heartbeat_reason(datagram);
+  // The heartbeat of CONNECTING leaves out this reason.
+  if (reason == SafeReason::none && is_connecting_heartbeat(datagram)) reason = SafeReason::link;
   if (reason == reason_) return;  // reported, or due to be reported
   reason_due_ = reason != SafeReason::none;
   reason_ = reason;

@@ -109,7 +109,7 @@ class CanNode {
   IsotpReceiver telemetry_in_;
 
   Offered offered_ = Offered::nothing;
-  SafeReason reason_ = SafeReason::none;  // reason in the newest heartbeat
+  SafeReason reason_ = SafeReason::link;  // of the newest heartbeat; a board starts without a host
   bool reason_due_ = false;
   bool request_due_ = false;
   CanNodeCounters counters_;

@@ -251,7 +251,7 @@ TEST_F(SimulatedBoardTest, WaitsForAHostAndThenStreamsTheInputsOfTheBench) {
     EXPECT_EQ(line, "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
   }
   EXPECT_EQ(listener_.heard.size(), 3U);
-  EXPECT_EQ(events_, (Lines{"up", "CONNECTING none", "outputs 0"}));
+  EXPECT_EQ(events_, (Lines{"up", "CONNECTING link", "outputs 0"}));
 
   connect();
   run_alive(1000);
@@ -375,7 +375,7 @@ TEST_F(SimulatedBoardTest, ARebootForgetsTheHostAndChangesTheClock) {
   const std::uint32_t before = board_->now_ms();
   events_.clear();
   run(51);
-  EXPECT_EQ(events_, (Lines{"CONNECTING none", "outputs 0"}));
+  EXPECT_EQ(events_, (Lines{"CONNECTING link", "outputs 0"}));
   EXPECT_TRUE(board_->model().pins().is_safe());
   EXPECT_GT(board_->now_ms() - before, 1000U);
   EXPECT_EQ(listener_.heard.back(), "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
@@ -569,7 +569,7 @@ TEST_F(TroubledBoardTest, AHungLoopGoesSafeBeforeTheWatchdogResetsIt) {
 TEST_F(TroubledBoardTest, TheWatchdogResetsALoopThatStaysHung) {
   drive("0.3 hang 5\n");
   run(1000);
-  EXPECT_EQ(events_, (Lines{"outputs 0", "CONNECTING none", "CONNECTING watchdog"}));
+  EXPECT_EQ(events_, (Lines{"outputs 0", "CONNECTING link", "CONNECTING watchdog"}));
   EXPECT_TRUE(board_->model().pins().is_safe());
   heartbeat(0);
   heartbeat(newest_t());

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -271,6 +272,16 @@ TEST(CanNode, ABoardThatGoesSafeReportsItFirstInOneFrame) {
   EXPECT_EQ(beat(""), telemetry_id(3));
   EXPECT_EQ(beat("SAFE:4;"), went_safe_id(3));
   EXPECT_EQ(bus.at_host.size(), 6U);
+}
+
+TEST(CanNode, ABoardWithoutAHostDidNotGoSafe) {
+  NodeBus bus;
+  for (const char* heartbeat : {"H:R4-ROS2;PNum:0;T:0;", "H:R4-ROS2;PNum:1;T:7;SAFE:1;",
+                                "H:R4-ROS2;PNum:0;T:0;", "H:R4-ROS2;PNum:1;T:9;SAFE:1;"}) {
+    bus.board.begin(with_crc(heartbeat), bus.now_us);
+    bus.settle();
+  }
+  EXPECT_EQ(std::count(bus.ids.begin(), bus.ids.end(), went_safe_id(3)), 0);
 }
 
 TEST(CanNode, AnUnsentSafeReasonIsSentLater) {
