@@ -60,7 +60,7 @@ struct CarrierCounters {
   std::uint64_t rx_datagrams = 0;
   std::uint64_t rx_bytes = 0;
   std::uint64_t rx_oversize = 0;   // dropped lines or packets that were too long
-  std::uint64_t rx_foreign = 0;    // dropped packets from an address that is not the board's
+  std::uint64_t rx_foreign = 0;    // dropped packets that are not from the board's address and port
   std::uint64_t rx_overflows = 0;  // frames that the system or controller dropped unread (CAN)
   std::uint64_t tx_datagrams = 0;
   std::uint64_t tx_bytes = 0;

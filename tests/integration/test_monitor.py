@@ -11,8 +11,9 @@ import subprocess
 import time
 import zlib
 
+from m7_board import Relay
 from machine import SANITIZED
-from r4_process import PATIENCE_S, R4, Board, free_port
+from r4_process import PATIENCE_S, R4, Board
 
 
 def datagram(fields):
@@ -21,10 +22,8 @@ def datagram(fields):
 
 
 def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():
-    port = free_port()
-    with Board('udp://127.0.0.1:0', options=['--set', 'rate,500']) as board, \
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise, \
-            subprocess.Popen([R4, 'monitor', f'{board.url}?listen={port}', '--json', '--control'], text=True,
+    with Board('udp://127.0.0.1:0', options=['--set', 'rate,500']) as board, Relay(board.url) as relay, \
+            subprocess.Popen([R4, 'monitor', relay.url, '--json', '--control'], text=True,
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as host:
         assert host.stdout.readline()
         board.state('ACTIVE')
@@ -32,7 +31,7 @@ def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():
 
         def make_noise():
             for _ in range(10):
-                noise.sendto(bytes(range(128, 256)) * 8, ('127.0.0.1', port))
+                relay.to_host.sendto(bytes(range(128, 256)) * 8, relay.host)
 
         board.never('SAFE', 1.8, make_noise)
         host.send_signal(signal.SIGINT)

@@ -10,6 +10,7 @@ import zlib
 
 import pytest
 
+from m7_board import Relay
 from machine import SANITIZED, within, within_ms
 from r4_process import PATIENCE_S, Board, driving, free_port, is_link, is_state, lasts, monitor, objects, run
 
@@ -296,11 +297,9 @@ def test_noise_from_other_programs_has_no_effect(board):
 
 
 def test_a_host_reports_noise_and_keeps_its_link(board):
-    port = free_port()
-    with monitor(f'{board.url}?listen={port}') as host, \
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
+    with Relay(board.url) as relay, monitor(relay.url) as host:
         host.next(is_link('active'))
-        noise.sendto(b'AIN24:24.28;PNum:1;T:1;^0x1^', ('127.0.0.1', port))
+        relay.to_host.sendto(b'AIN24:24.28;PNum:1;T:1;^0x1^', relay.host)
         error = host.next(lambda each: each['type'] == 'error')
         assert error['fields']['error'] == 'crc' and error['fields']['found'] == '0x1'
         host.next(is_state)

@@ -28,7 +28,7 @@ asio::error_code UdpHostSocket::bind(const Endpoint& local, const Endpoint& boar
   asio::error_code error;
   local_ = local;
   board_ = board;
-  connected_ = neighbours_ = false;
+  connected_ = false;
   std::vector<UdpHostSocket*> others;
   for (UdpHostSocket* const each : all.sockets) {
     if (each->local_ != local_) continue;
@@ -46,13 +46,10 @@ asio::error_code UdpHostSocket::bind(const Endpoint& local, const Endpoint& boar
       for (UdpHostSocket* const each : others) each->socket_.set_option(option, ignored);
     };
     share(true);
-    for (UdpHostSocket* const each : others) {
-      if (each->board_.address() == board.address()) each->neighbours_ = true;
-    }
     socket_.bind(local_, error);
     if (!error) socket_.connect(board, error);
     share(false);
-    connected_ = neighbours_ = true;
+    connected_ = true;
   }
   if (!error) local_.port(socket_.local_endpoint(error).port());
   if (!error) all.sockets.push_back(this);

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The socket with which a host hears one board. The boards of a program share the port of hosts.
-// Another program cannot share this port, so a conflict is noticed. The first socket receives from
-// all ports of its board. A further socket is bound to the same port and connected,
-// so it receives from its board's port only. A packet between bind and connect may be lost.
+// Another program cannot share this port, so a conflict is noticed. A further socket is bound to
+// the same port and connected, so the kernel gives it its board's packets, and the first socket
+// all other packets. A packet between bind and connect may be lost.
 #pragma once
 
 #include <asio/error_code.hpp>
 #include <asio/io_context.hpp>
 #include <asio/ip/udp.hpp>
-#include <atomic>
 #include <cstdint>
 
 #include "../operation_slot.hpp"
@@ -35,18 +34,13 @@ class UdpHostSocket {
   // If connected, lets the kernel choose again. 0, or errno.
   int reconnect();
 
-  bool hears(const Endpoint& sender) const {
-    return sender.address() == board_.address() &&
-           (!neighbours_.load(std::memory_order_relaxed) || sender.port() == board_.port());
-  }
+  bool hears(const Endpoint& sender) const { return sender == board_; }
 
  private:
   UdpSocket& socket_;
   Endpoint local_;
   Endpoint board_;
   bool connected_ = false;
-  // True if this program has, or had, another board at that address: the port distinguishes them.
-  std::atomic<bool> neighbours_{false};
 };
 
 }  // namespace r4
