@@ -17,7 +17,7 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
       arming(options.session.arming),
       callback_limit(options.callback_limit),
       async(io, make(loop), options),
-      box(io, [this](const CommandOrGroup& letter) { deliver(letter); }),
+      box(io, [this](const CommandOrGroup& what, bool late) { deliver(what, late); }),
       callbacks([this](Clock::duration busy) { on_callback_end(busy); },
                 [this](int channel) {
                   const std::lock_guard lock(mutex);
@@ -147,16 +147,16 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   });
 }
 
-void Board::Impl::deliver(const CommandOrGroup& letter) {
-  PostResult result = PostResult::no_link;
+void Board::Impl::deliver(const CommandOrGroup& what, bool late) {
+  PostResult result = late ? PostResult::late : PostResult::no_link;
   try {
-    result = std::visit([this](const auto& what) { return async.post(what); }, letter);
+    if (!late) result = std::visit([this](const auto& each) { return async.post(each); }, what);
   } catch (const Error&) {  // the program may have released control after the post
   }
   if (result) return;
-  RefusedPost refused{first_of(letter), Refusal::none, result};
+  RefusedPost refused{first_of(what), Refusal::none, result};
   refused.command.text = refused.command.text2 = Text();
-  const auto* const group = std::get_if<Setpoints>(&letter);
+  const auto* const group = std::get_if<Setpoints>(&what);
   if (group != nullptr) refused.group = static_cast<std::uint8_t>(group->size());
   callbacks.notify(refused);
 }

@@ -76,7 +76,7 @@ struct Board::Impl final : BlockingLoop {
 
   void listen();
   void take_name();
-  void deliver(const CommandOrGroup& letter);
+  void deliver(const CommandOrGroup& what, bool late);
   void take_uarts(const State& fresh);
   void on_end() override;
   void on_close() override;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bounded queue of commands from any thread to a loop. Allocates only for commands with texts.
+// A bounded queue of commands from any thread to a loop. Allocates only for commands with texts. A
+// command that waits for longer than `oldest`, because the loop stands still, is not delivered.
 #pragma once
 
 #include <asio/bind_allocator.hpp>
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory_resource>
@@ -27,21 +29,25 @@ inline Command first_of(const CommandOrGroup& what) {
 
 class PostBox {
  public:
+  using Clock = std::chrono::steady_clock;
   static constexpr std::size_t capacity = 256;
+  static constexpr std::chrono::milliseconds oldest{100};  // as SendQueue
 
-  // `deliver` is called on the loop for each command or group. The loop must end before the box.
-  PostBox(asio::io_context& io, std::function<void(const CommandOrGroup&)> deliver)
-      : io_(io), deliver_(std::move(deliver)) {
+  // On the loop, `deliver` is called for each command or group; `late`: it waited too long. A stop
+  // is never late. The loop must end before the box.
+  using Deliver = std::function<void(const CommandOrGroup& what, bool late)>;
+  PostBox(asio::io_context& io, Deliver deliver, Clock::time_point (*now)() = &Clock::now)
+      : io_(io), deliver_(std::move(deliver)), now_(now) {
     waiting_.reserve(capacity);
     taken_.reserve(capacity);
   }
 
   // From any thread. False if the box is full. A stop is never refused, and is delivered first.
-  bool put(const CommandOrGroup& letter) {
+  bool put(const CommandOrGroup& what) {
     const std::lock_guard lock(mutex_);
-    if (first_of(letter).kind == CommandKind::stop) waiting_.clear();
+    if (is_stop(what)) waiting_.clear();
     if (waiting_.size() >= capacity) return false;
-    waiting_.push_back(letter);
+    waiting_.push_back({what, now_()});
     if (std::exchange(woken_, true)) return true;
     const std::pmr::polymorphic_allocator<std::byte> allocator(&wake_memory_);
     asio::post(io_, asio::bind_allocator(allocator, [this] { deliver(); }));
@@ -49,6 +55,15 @@ class PostBox {
   }
 
  private:
+  struct Letter {
+    CommandOrGroup what;
+    Clock::time_point at;
+  };
+
+  static bool is_stop(const CommandOrGroup& what) {
+    return first_of(what).kind == CommandKind::stop;
+  }
+
   void deliver() {
     {
       const std::lock_guard lock(mutex_);
@@ -56,15 +71,19 @@ class PostBox {
       wake_memory_.release();  // Asio freed this memory before the call
       taken_.swap(waiting_);
     }
-    for (const CommandOrGroup& letter : taken_) deliver_(letter);
+    const Clock::time_point now = now_();
+    for (const Letter& letter : taken_) {
+      deliver_(letter.what, now - letter.at > oldest && !is_stop(letter.what));
+    }
     taken_.clear();
   }
 
   asio::io_context& io_;
-  const std::function<void(const CommandOrGroup&)> deliver_;
+  const Deliver deliver_;
+  Clock::time_point (*const now_)();
   std::mutex mutex_;
-  std::vector<CommandOrGroup> waiting_;
-  std::vector<CommandOrGroup> taken_;
+  std::vector<Letter> waiting_;
+  std::vector<Letter> taken_;
   bool woken_ = false;
   // Memory of the only wake-up under way.
   alignas(std::max_align_t) std::byte wake_buffer_[128];

@@ -74,6 +74,8 @@ const char* to_text(PostResult result) {
       return "no link";
     case PostResult::queue_full:
       return "queue full";
+    case PostResult::late:
+      return "late";
   }
   return "unknown";
 }

@@ -144,6 +144,7 @@ class PostResult(Word):
     NOT_ARMED = 'not armed', 'not sent: it drives an output, and the program is not armed: arm()'
     NO_LINK = 'no link', 'not sent: the link is not up, or the board does not accept our commands yet'
     QUEUE_FULL = 'queue full', 'not sent: too many commands wait already: try again later'
+    LATE = 'late', 'not sent: waited for more than 100 ms, because the thread of the link stood still'
 
     def __bool__(self) -> bool:
         return self is PostResult.SENT
