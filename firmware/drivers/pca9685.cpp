@@ -129,13 +129,8 @@ bool Pca9685::set_up(std::uint32_t now_us, BusBudget& budget) {
       return true;
     }
     case Step::check: {
-      std::uint8_t found = 0;
       if (budget.left() < 9) return budget.take(9);
-      if (!check_mode(budget) || !fetch(pre_scale, &found, 1, budget)) return false;
-      if (found != prescale_) {
-        fail(ChipTrouble::wrong_register);
-        return false;
-      }
+      if (!check_mode(budget) || !check_frequency(budget)) return false;
       set_ready();
       return true;
     }
@@ -231,12 +226,20 @@ bool Pca9685::check_mode(BusBudget& budget) {
   return false;
 }
 
+bool Pca9685::check_frequency(BusBudget& budget) {
+  std::uint8_t found = 0;
+  if (!fetch(pre_scale, &found, 1, budget)) return false;
+  if (found == prescale_) return true;
+  fail(ChipTrouble::wrong_register);
+  return false;
+}
+
 void Pca9685::on_verify(BusBudget& budget) {
-  if (budget.left() < 12) {
-    budget.take(12);
+  if (budget.left() < 16) {
+    budget.take(16);
     return;
   }
-  if (!check_mode(budget)) return;
+  if (!check_mode(budget) || !check_frequency(budget)) return;
   const int first = 4 * verified_channel_;
   std::uint8_t found[4] = {};
   if (!fetch(static_cast<std::uint8_t>(led0_on_l + first), found, sizeof found, budget)) return;

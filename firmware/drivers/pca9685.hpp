@@ -74,13 +74,14 @@ class Pca9685 final : public ChipDriver {
   void on_write_changes(BusBudget& budget) override;
   void on_verify(BusBudget& budget) override;
   bool check_mode(BusBudget& budget);
+  bool check_frequency(BusBudget& budget);
   bool wanted(int index, std::uint8_t& value) const;
   struct Registers;
   void take_differing(int channel, Registers& found) const;
   std::uint16_t next_burst(std::size_t most, Registers& burst);
 
   std::uint8_t prescale_;
-  std::uint8_t partner_[channels];  // itself: none
+  std::uint8_t partner_[channels];  // the channel's own number: no partner
   Step step_ = Step::off;
   std::uint32_t awake_us_ = 0;
   std::uint8_t verified_channel_ = 0;

@@ -255,6 +255,20 @@ TEST(BoardFaults, ResetsAndReportsAChipWithDisturbedModes) {
   }
 }
 
+TEST(BoardFaults, ReportsAChipWithADisturbedFrequency) {
+  for (int chip = 0; chip < 3; ++chip) {
+    Bench bench;
+    bench.boot();
+    bench.apply(full());
+    sim::Pca9685Model* const chips[] = {&bench.board.osmc, &bench.board.dhb12, &bench.board.servo};
+    chips[chip]->disturb(0xFE, 0x10);
+    bench.run(chip_count * 20 + 2);
+    EXPECT_TRUE(bench.board.pins().is_safe()) << chip;
+    EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::wrong_register) << chip;
+    EXPECT_EQ(bench.hardware.fault().address, 0x40 + chip);
+  }
+}
+
 // docs/reference/safety.md, "How long it takes". Each check reads one of the 16 outputs.
 TEST(BoardFaults, NoticesADisturbedOutputWithin16ChecksAlsoInTheSafeState) {
   constexpr std::uint8_t full = 0x10;
