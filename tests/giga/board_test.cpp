@@ -507,7 +507,7 @@ TEST(GigaReport, MatchesFigure3OfThePaper) {
       "192.168.0.162",
       "Connected to Wifi: lab : WL_CONNECTED",
       "Starting Wifi UDP - 0 means failed: 1, port 2018",
-      "CAN: node 1, active, errors sent 0, received 0, bus-offs 0",
+      "CAN: 1000 kbit/s, node 1, active, errors sent 0, received 0, bus-offs 0",
       "Settings: kept in the key-value store",
       "Wiring: given by its owner",
       "PCA9685 0x40 (OSMC): ok",

@@ -218,12 +218,14 @@ TEST(GigaWiringFault, AStoreThatCannotBeReadConnectsNothing) {
   GigaBench bench;
   bench.giga.flash_damaged = true;
   expect_lost(bench);
+  EXPECT_TRUE(has_line(bench.report(), "CAN: 1000 kbit/s, node 1, off")) << "its number is unknown";
 }
 
 TEST(GigaWiringFault, AStoreThatHangsConnectsNothing) {
   GigaBench bench;
   bench.giga.flash_hangs = true;
   expect_lost(bench);
+  EXPECT_TRUE(has_line(bench.report(), "CAN: 1000 kbit/s, node 1, off")) << "its number is unknown";
   bench.giga.flash_hangs = false;
 }
 

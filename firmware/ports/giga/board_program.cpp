@@ -14,7 +14,6 @@ namespace {
 
 // Settings are stored after they have not changed for this time.
 constexpr std::uint32_t settle_ms = 1000;
-constexpr std::uint32_t can_bit_rate = 1000000;
 
 Text board_id() {
   static char text[24];
@@ -136,7 +135,8 @@ void BoardProgram::start() {
   udp_number_ = application_.add_port(udp_);
   can_number_ = application_.add_port(can_);
   use(used_);
-  const bool has_can = start_can(fdcan_, used_.site.can_node);
+  // With unknown settings the node number may belong to another node.
+  const bool has_can = !store_.hides_settings() && start_can(fdcan_, used_.site.can_node);
   const std::uint32_t now_ms = BoardClock::now_ms();
   application_.start(now_ms);
   if (last_boot_ != SafeReason::none) application_.fail(last_boot_, now_ms);

@@ -220,7 +220,8 @@ Text BootReport::next(char (&out)[max_line]) {
       line.text("Starting Wifi UDP - 0 means failed: 1, port ").number(settings.site.udp_port);
       return line.done();
     case 19:
-      line.text("CAN: node ").number(settings.site.can_node).text(", ");
+      line.text("CAN: ").number(can_bit_rate / 1000).text(" kbit/s, node ");
+      line.number(settings.site.can_node).text(", ");
       line.words(to_text(sources_.can->state()));
       line.text(", errors sent ").number(sources_.can->transmit_errors());
       line.text(", received ").number(sources_.can->receive_errors());

@@ -62,11 +62,13 @@ void SettingsStore::serve() {
 void SettingsStore::load(Settings& settings) {
   const StoreState now = state();
   keeps_ = now == StoreState::ready;
-  if (now == StoreState::loading || now == StoreState::avoided) settings.site.lose_wiring();
   Record record;
   std::uint32_t version = 0;
-  if (!keeps_ || !from_store_.take(version, record)) return;
-  if (record.size == unreadable) return settings.site.lose_wiring();
+  const bool has_record = keeps_ && from_store_.take(version, record);
+  hides_settings_ = now == StoreState::loading || now == StoreState::avoided ||
+                    (has_record && record.size == unreadable);
+  if (hides_settings_) settings.site.lose_wiring();
+  if (hides_settings_ || !has_record) return;
   read_settings(Text(record.text, record.size), settings);
 }
 

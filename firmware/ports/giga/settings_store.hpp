@@ -33,6 +33,8 @@ class SettingsStore {
   // Call once. Without stored settings the defaults stay. If the store is loading or avoided, the
   // wiring counts as damaged, and nothing is stored later, to keep the old settings.
   void load(Settings& settings);
+  // True if the store may hold settings that load() could not read, such as a node number.
+  bool hides_settings() const { return hides_settings_; }
   // Stores `settings` soon, on the thread.
   void keep(const Settings& settings);
   bool keeps() const { return keeps_; }
@@ -52,6 +54,7 @@ class SettingsStore {
   static constexpr std::uint32_t stack_size = 8192;
 
   bool keeps_ = false;
+  bool hides_settings_ = false;
   std::atomic<StoreState> state_{StoreState::loading};
   std::atomic<std::uint32_t> failures_{0};
   HandOver<Record> from_store_;

@@ -9,7 +9,7 @@ namespace giga {
 namespace {
 
 std::atomic<std::uint32_t> shown_ms{0};  // NOLINT(cppcoreguidelines-avoid-non-const-*)
-// Used by advance() only.
+// Not atomic, because after start() only advance() uses it.
 std::uint32_t counted_us = 0;  // shown_ms counts up to this time  NOLINT
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Microseconds of the core's timer, also in interrupts and fault handlers, wrap after 71 minutes.
-// From microseconds the timer interrupt derives all milliseconds. Milliseconds wrap after 49 days.
+// The microseconds are of the core's timer and wrap after 71 minutes. Interrupts and fault handlers
+// may read them. The timer interrupt counts the milliseconds, which wrap after 49 days.
 #pragma once
 
 #include <cstdint>

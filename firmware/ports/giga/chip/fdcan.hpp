@@ -19,6 +19,8 @@
 namespace r4 {
 namespace giga {
 
+constexpr std::uint32_t can_bit_rate = 1000000;  // of all nodes of the bus
+
 // Sample point at 86.7 %, as near as the clock allows.
 struct CanBitTiming {
   std::uint32_t prescaler = 1;
@@ -70,8 +72,8 @@ class Fdcan {
 
   CanState state() const;
   bool on_bus() const { return started_ && !bus_off_; }
-  std::uint32_t transmit_errors() const { return registers_.ECR & 0xFFU; }
-  std::uint32_t receive_errors() const { return registers_.ECR >> 8 & 0x7FU; }
+  std::uint32_t transmit_errors() const { return started_ ? registers_.ECR & 0xFFU : 0; }
+  std::uint32_t receive_errors() const { return started_ ? registers_.ECR >> 8 & 0x7FU : 0; }
   const FdcanCounters& counters() const { return counters_; }
 
   static constexpr std::uint32_t words_used = 2 + 2 + 64 * 4 + 8 * 4 + 9 * 4;
