@@ -127,6 +127,11 @@ void forget_learnt(Report& report, bool full_scales) {
   }
 }
 
+// True if the person skipped the check. A check of a thing that is not connected has a note.
+bool is_skipped(const CheckResult& result) {
+  return result.status == Status::skipped && result.note.empty();
+}
+
 // The outputs that agree with the unconfirmed plan; 0 if a check disagrees or was not done.
 int outputs_as_planned(const Report& report) {
   if (report.wiring_source != to_text(WiringSource::plan) || !report.found().empty()) return 0;
@@ -134,7 +139,10 @@ int outputs_as_planned(const Report& report) {
   for (const Check& check : checks()) {
     const auto result = std::find_if(report.checks.begin(), report.checks.end(),
                                      [&](const CheckResult& each) { return each.id == check.id; });
-    if (result == report.checks.end() || result->status == Status::not_done) return 0;
+    if (result == report.checks.end() || result->status == Status::not_done ||
+        is_skipped(*result)) {
+      return 0;
+    }
     if (result->status == Status::passed && !check.moves.empty()) ++outputs;
   }
   return outputs;

@@ -408,8 +408,8 @@ TEST(Commissioning, DoesNotJudgeABoardThatHasYetToUseItsWiring) {
   EXPECT_EQ(person.movements, 0);
 }
 
-TEST(Commissioning, OffersThePlanOnlyIfAnOutputWasSeenToAgree) {
-  for (const bool seen : {false, true}) {
+TEST(Commissioning, OffersThePlanOnlyIfAnOutputWasSeenToAgreeAndNoCheckWasSkipped) {
+  for (const auto& [seen, skips] : {std::pair{false, false}, {true, false}, {true, true}}) {
     Bench bench({.new_board = true});
     SimulatedPerson person(bench);
     int offered = 0;
@@ -422,11 +422,12 @@ TEST(Commissioning, OffersThePlanOnlyIfAnOutputWasSeenToAgree) {
     begun.wiring = plan_wiring();
     for (const auto& check : commissioning::checks()) {
       begun.checks.push_back({check.id, commissioning::Status::skipped});
+      if (!skips) begun.checks.back().note = "nothing is connected";
     }
     Commissioning commissioning(bench, person, begun);
     if (seen) commissioning.run("osmc 1");
     commissioning.offer();
-    EXPECT_EQ(offered, seen ? 1 : 0);
+    EXPECT_EQ(offered, seen && !skips ? 1 : 0);
   }
 }
 
