@@ -214,7 +214,9 @@ std::string Crowd::say_something() {
   const std::string number = std::to_string(random_.below(1ULL << 32));
   const std::string sid = fmt::format(";SID:{:016x}", random_.next());
   const std::string end = (random_.chance(0.5) ? "" : sid) + ";PNum:" + number + ";T:1;";
-  const bool owned = application_->link().has_owner();
+  // The board notices only at its next datagram that the host has been silent for too long.
+  const BoardLink& link = application_->link();
+  const bool owned = link.has_owner() && !reached(board_ms(), link.deadline_ms());
   const bool may_take = with_key_ || owned;
   const std::uint64_t asking = with_key_ ? 100 : 500;
   std::uint64_t what = random_.below(16);
