@@ -42,12 +42,13 @@ DatagramWriter& DatagramWriter::field(Text name) {
 }
 
 DatagramWriter& DatagramWriter::field(const FieldName& name) {
-  if (static_cast<std::size_t>(end_ - at_) < sizeof name.text_) return field(name.name());
+  if (static_cast<std::size_t>(end_ - at_) <= sizeof name.text_) return field(name.name());
   if (!ok_) return *this;
-  const std::size_t skip = open_ ? 0 : 1;
+  *at_ = ';';
+  at_ += open_ ? 1 : 0;
   // Copies all of text_, because the compiler knows its size. Later bytes overwrite the excess.
-  std::memcpy(at_, name.text_ + skip, sizeof name.text_ - 1);
-  at_ += name.size_ + 2 - skip;
+  std::memcpy(at_, name.text_, sizeof name.text_);
+  at_ += name.size_ + 1;
   open_ = true;
   has_value_ = false;
   return *this;

@@ -21,6 +21,7 @@ struct Entry {
   FieldForm form = FieldForm::volts;
   std::uint16_t place = 0;  // offset in State
 };
+static_assert(sizeof(Entry) == 16, "a power of two, so that finding an entry is a shift");
 
 struct FieldTable {
   Entry entries[state_field_count];

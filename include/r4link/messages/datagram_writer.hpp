@@ -18,22 +18,20 @@
 
 namespace r4 {
 
-// A field name as a compile-time constant in wire form, ";OSMC1:", so that writing needs no check
-// and no loop. A name of more than 12 characters does not compile.
+// A field name as a compile-time constant in wire form, "OSMC1:", so that writing needs no check
+// and no loop. A name of more than 10 characters does not compile.
 class FieldName {
  public:
   constexpr FieldName() = default;
   explicit constexpr FieldName(Text name) : size_(static_cast<std::uint8_t>(name.size())) {
-    text_[0] = ';';
-    for (std::size_t i = 0; i < name.size(); ++i) text_[i + 1] = name[i];
-    text_[name.size() + 1] = ':';
-    text_[name.size() + 2] = '\0';  // outside of text_ if the name is too long
+    for (std::size_t i = 0; i < name.size(); ++i) text_[i] = name[i];
+    text_[name.size()] = ':';  // outside of text_ if the name is too long
   }
-  constexpr Text name() const { return Text(text_ + 1, size_); }
+  constexpr Text name() const { return Text(text_, size_); }
   // True if the grammar allows the name; for a static_assert.
   constexpr bool allowed() const {
-    if (size_ == 0 || size_ > 12) return false;
-    for (int i = 1; i <= size_; ++i) {
+    if (size_ == 0 || size_ > 10) return false;
+    for (int i = 0; i < size_; ++i) {
       const char c = text_[i];
       if (c <= ' ' || c > '~' || c == ':' || c == ';' || c == ',' || c == '^') return false;
     }
@@ -42,7 +40,7 @@ class FieldName {
 
  private:
   friend class DatagramWriter;
-  char text_[15] = {};
+  char text_[11] = {};
   std::uint8_t size_ = 0;
 };
 
