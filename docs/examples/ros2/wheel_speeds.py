@@ -78,6 +78,8 @@ def main():
 
     def on_joints(joints):
         speeds = dict(zip(joints.name, joints.velocity))
+        if not {'encoder1', 'encoder2'} <= speeds.keys():  # a part of the state was lost
+            return
         duties = base.update((speeds['encoder1'], speeds['encoder2']), time.monotonic())
         for motor, duty in zip(motors, duties):
             motor.publish(Float32(data=duty))

@@ -38,11 +38,11 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   if (options_.drive) {
     subscribe_drive(graph, node, inbox);
   } else {
-    decline(graph, node, "cmd_vel",
+    decline(graph, node, "cmd_vel", Mismatch::Weight::warning,  // another node may receive it
             "the motors of the wheels are not known; start r4 ros2 with --drive, such as --drive "
             "osmc1,-osmc2");
   }
-  decline(graph, node, "relay1/command",
+  decline(graph, node, "relay1/command", Mismatch::Weight::lost,
           "relay 1 is the motors' supply, and closes when the board is armed");
   serve_all(graph, node, inbox);
   board_.on_state([this](const ReceivedState& state, const Datagram&) {
@@ -145,6 +145,7 @@ void BoardCommands::tell(const std::string& what, PostResult result) {
     const Problem problem = for_a_node(explain("command", cause), cause);
     warn(fmt::format("not armed ({}): {}", to_text(cause), problem.fix));
   } else {
+    ++dropped_;
     warn(fmt::format("a command was dropped: {} ({})", to_text(result), what));
   }
 }

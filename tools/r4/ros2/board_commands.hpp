@@ -44,6 +44,7 @@ class BoardCommands {
   void arm_at_first();
 
   std::uint64_t stale() const { return stale_; }
+  std::uint64_t dropped() const { return dropped_; }  // without a link, or the queue was full
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -68,7 +69,8 @@ class BoardCommands {
   void subscribe_speed(Graph& graph, std::size_t node, Inbox& inbox, const void* source, Read read);
   void subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox);
   void on_speed(const Speed& speed, const void* source, const Origin& origin);
-  static void decline(Graph& graph, std::size_t node, const char* topic, const char* why);
+  static void decline(Graph& graph, std::size_t node, const char* topic, Mismatch::Weight weight,
+                      const char* why);
   void subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox);
   void subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox);
 
@@ -121,6 +123,7 @@ class BoardCommands {
   Clock::time_point stopped_{};  // newest stop: an arm or E:CLEAR written before it is refused
   Pressed pressed_;              // on `arm`
   std::uint64_t stale_ = 0;
+  std::uint64_t dropped_ = 0;
   std::vector<std::unique_ptr<int>> sources_;  // each address identifies a topic
 };
 

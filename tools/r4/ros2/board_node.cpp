@@ -195,6 +195,7 @@ Health BoardNode::health() const {
   add("commands", fmt::format("{}", statistics.commands));
   add("commands refused", fmt::format("{}", statistics.refused));
   add("commands too old", fmt::format("{}", commands_.stale()));
+  add("commands dropped", fmt::format("{}", commands_.dropped()));
   add("samples malformed", fmt::format("{}", inbox_.malformed()));
   add("samples dropped", fmt::format("{}", inbox_.dropped()));
   constexpr std::size_t most_mismatches = 8;  // a graph may have any number

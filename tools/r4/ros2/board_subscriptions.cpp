@@ -121,6 +121,7 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
       post_wanted();  // a transfer is sent alone, after earlier commands
       if (const PostResult result = board_.post(command); !result) tell(shown(command), result);
     } else {
+      ++dropped_;
       warn(fmt::format(
           "a command was dropped: more than {} commands without an output arrived at once ({})",
           most_others, shown(command)));
@@ -258,10 +259,11 @@ void BoardCommands::on_speed(const Speed& speed, const void* source, const Origi
 }
 
 // Warns about topics that ROS users often publish but that would have no effect.
-void BoardCommands::decline(Graph& graph, std::size_t node, const char* topic, const char* why) {
-  graph.on_other_type(node, topic, [topic, why](const Announced& writer) {
-    return Mismatch{Mismatch::Weight::lost, fmt::format("{}: a publisher ({}) is not received: {}",
-                                                        topic, writer.owner_text(), why)};
+void BoardCommands::decline(Graph& graph, std::size_t node, const char* topic,
+                            Mismatch::Weight weight, const char* why) {
+  graph.on_other_type(node, topic, [topic, weight, why](const Announced& writer) {
+    return Mismatch{weight, fmt::format("{}: a publisher ({}) is not received: {}", topic,
+                                        writer.owner_text(), why)};
   });
 }
 

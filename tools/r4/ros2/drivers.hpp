@@ -55,7 +55,7 @@ class Drivers {
   // command. A stepper waits for its position. Voltages, missing on some boards, are stopped last.
   struct Stop {
     std::vector<Command> commands;
-    std::uint64_t sent = 0;  // number of commands sent before
+    std::uint64_t sent = 0;  // number of commands sent before to_stop()
     bool missed = false;     // a publisher has disappeared or is silent
   };
   Stop to_stop(Time now);

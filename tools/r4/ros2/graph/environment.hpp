@@ -2,7 +2,7 @@
 // Selects the ROS 2 graph and its reach by the environment variables of ROS. Default: loopback.
 //     ROS_DOMAIN_ID                   0-232; 0
 //     ROS_AUTOMATIC_DISCOVERY_RANGE   LOCALHOST (ours by default), SUBNET, OFF, SYSTEM_DEFAULT
-//     ROS_LOCALHOST_ONLY              1: LOCALHOST; 0: SUBNET; older releases; overrides the range
+//     ROS_LOCALHOST_ONLY              older releases: 1: LOCALHOST, overrides the range; 0: SUBNET
 //     ROS_STATIC_PEERS                addresses of further computers, separated by semicolons
 //     CYCLONEDDS_URI                  Cyclone's own configuration: overrides all except the domain
 #pragma once
