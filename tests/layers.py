@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fails when a source includes a file that its room (folder) may not include. Usage: layers.py TREE
 
-The layers are tools > host > transports > protocol, and tools > firmware > transports/framing > protocol. ALLOWED orders
+The layers are host > transports > protocol, and firmware > transports/framing > protocol; tools include public headers,
+and some rooms of tools any layer. ALLOWED orders
 the rooms of a layer. Only host/standard_registry.cpp may include firmware/ports/sim. The public headers, include/r4link,
 are below all layers. The portable rooms (protocol, transports/framing, firmware without its ports, the chip models)
 and the public headers that these rooms include use only headers that a C++14 board has.

@@ -16,7 +16,8 @@ struct SessionOptions;
 
 void require_valid(const SessionOptions& options);
 
-// A watcher may send only a stop and Q:ID. For other commands these functions throw Error.
+// A watcher may send only a stop, Q:ID and Q:WIRING. For other commands these functions throw
+// Error.
 void require_control(BoardRole role, std::string_view what);
 void require_control(BoardRole role, const Command& command);
 void require_control(BoardRole role, const Setpoints& group);

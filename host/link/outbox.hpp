@@ -65,7 +65,7 @@ class Delivery {
   void begin(Outbox::Sent sent);
   bool on_sent(const Sending& sending, SendResult result);
   bool failed() const { return open_ == 0 && result_ != SendResult::sent; }
-  // `sent` as soon as one path has taken the datagram; before that, the first path's result.
+  // `sent` as soon as one path has taken the datagram; before that, the first result but `down`.
   SendResult result() const { return result_; }
   std::uint32_t pnum() const { return pnum_; }
 

@@ -87,7 +87,7 @@ class AsyncBoard {
   executor_type get_executor() const noexcept;
 
   // The first heartbeat is sent at once. If a path cannot be opened, on_event() reports it, and the
-  // board retries every second. Throws Error if no path can be opened. Can be called only once.
+  // path is tried again every second. Throws Error if no path can be opened. Call open() only once.
   void open();
   // Ends commands under way (outcome closed), sends one farewell and closes the transports. The
   // board goes safe at the farewell, or after its timeout. No callback follows. Idempotent.

@@ -85,7 +85,7 @@ enum class ChipTrouble : std::uint8_t {
   none = 0,
   no_acknowledge = 1,  // the chip does not answer
   bus_stuck = 2,       // a line of the bus is held low
-  was_reset = 3,       // the chip lost its set-up, so it was reset
+  was_reset = 3,       // the chip has reset itself and lost its set-up
   wrong_register = 4,  // a register does not hold the written value
   not_ready = 5,       // the chip is not ready in time, or cannot store its power-on values
   // Faults of the wiring (docs/reference/safety.md), with address 0:
@@ -179,6 +179,8 @@ struct UartBytes {
       0;  // bytes damaged or without room since the board started; not counted in `position`
   DeviceBytes<uart_max_bytes> data;
 };
+
+// --- sessions, refusals, links and peers
 
 // Identifies a host's session (SID): 64 random bits, new for each session.
 using SessionId = std::uint64_t;

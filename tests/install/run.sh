@@ -32,7 +32,7 @@ check() {
     exit 1
   }
   for words in 'board sim-1' 'OSMC 1 at  819 forward' 'motor 1 has turned by [1-9]' \
-    'link: safe, reason stop' ' us round trip'; do
+    'link: active' ' us round trip'; do
     grep -q "$words" "$work/out" || {
       cat "$work/out"
       echo "install: $name did not print '$words'"

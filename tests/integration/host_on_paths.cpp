@@ -7,7 +7,7 @@
 //     {"type":"state","at":12.345678,"t":…}                       at: time of reception, monotonic clock
 //     {"type":"command","command":"S:1000,1","confirmed":true}
 //     {"type":"path","at":…,"name":…,"carries":true}
-//     {"type":"link","at":…,"active":true}
+//     {"type":"link","at":…,"active":true,"state":"active","reason":"none"}
 #include <poll.h>
 #include <unistd.h>
 
@@ -58,7 +58,11 @@ void work(const std::vector<std::string>& urls) {
   };
   callbacks.on_link = [](const r4::LinkStatus& link) {
     const bool active = link.state == r4::HostLinkState::active;
-    print({{"type", "link"}, {"at", seconds(Clock::now())}, {"active", active}});
+    print({{"type", "link"},
+           {"at", seconds(Clock::now())},
+           {"active", active},
+           {"state", r4::to_text(link.state)},
+           {"reason", r4::to_text(link.reason)}});
   };
   r4::Board board(urls, options, callbacks);
   board.wait_active(30s);

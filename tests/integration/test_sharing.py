@@ -230,7 +230,7 @@ def test_a_refusal_names_a_suspended_controlling_program(board):
         try:
             refused = run('send', board.host_url, 'O:1,1,1')
             assert refused.returncode != 0
-            assert f'controlled by r4 (pid {host.process.pid}), which is stopped; continue that program' in refused.stderr, refused
+            assert f'controlled by r4 (pid {host.process.pid}), which is stopped; end that program' in refused.stderr, refused
         finally:
             host.signal(signal.SIGCONT)
 

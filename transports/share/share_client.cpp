@@ -67,7 +67,9 @@ Problem ShareClient::silence() const {
   const std::string pid = process_ == 0 ? "" : fmt::format(" (pid {})", process_);
   const std::string resume = process_ == 0 ? "fg" : fmt::format("kill -CONT {}", process_);
   return {ErrorKind::open, "", fmt::format("the program that has it open{} does not answer", pid),
-          fmt::format("if that program is stopped, continue it ({}); otherwise end it", resume)};
+          fmt::format("end it; if it is only stopped, you can continue it ({}), but if it controls "
+                      "the board, the outputs resume",
+                      resume)};
 }
 
 SendResult ShareClient::send_stop(std::string_view datagram) {

@@ -188,9 +188,11 @@ void SharedCarrier::require_control() {
       ErrorKind::refused, name_,
       fmt::format("controlled by {}{}{}", program, other ? fmt::format(" (pid {})", process) : "",
                   stopped ? ", which is stopped" : ""),
-      stopped ? fmt::format("continue that program (kill -CONT {0}), or end it (kill -KILL {0})",
-                            process)
-              : "end that program, or only watch the board, as r4 monitor does"};
+      stopped
+          ? fmt::format("end that program (kill -KILL {0}); if you continue it (kill -CONT {0}), "
+                        "the outputs resume",
+                        process)
+          : "end that program, or only watch the board, as r4 monitor does"};
   problem.holder = Program{process, program};
   throw Error(std::move(problem));
 }

@@ -14,7 +14,7 @@ struct UdpUrl {
   static constexpr std::uint16_t board_port = 2018;
   static constexpr std::uint16_t host_port = 2390;
 
-  // Throws Error{usage} for a URL that UDP refuses.
+  // Throws Error{usage} if `url` is not a valid UDP URL for `role`.
   UdpUrl(const Url& url, Role role);
 
   std::string text;

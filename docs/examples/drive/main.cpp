@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Accelerates OSMC channel 1 and slows it down again, prints the events and the counts of the
-// motor's encoder, and stops.
+// motor's encoder. When the program ends, the board switches all outputs off.
 //
 //     drive [URL]        sim: without a URL; udp://192.168.0.125, serial:auto …
 //
@@ -62,12 +62,10 @@ void drive(r4::Board& board) {
 
   std::printf("motor 1 has turned by %d counts\n", board.next_state(250ms).encoder(1) - from);
 
-  board.stop();  // all outputs safe, motors without supply; latched until E:CLEAR
   const r4::Statistics statistics = board.statistics();
   std::printf("%llu states, %.1f a second, %.0f us round trip, %.1f %% lost\n",
               static_cast<unsigned long long>(statistics.states), statistics.state_rate_hz,
               statistics.round_trip_us, statistics.loss() * 100);
-  board.send(r4::Command::clear());
 }
 
 }  // namespace

@@ -20,9 +20,7 @@ def main(url: str) -> None:
                 print(f'OSMC 1: {state.osmc1.pwm} {direction}, encoder {state.enc1}, {state.ain24:.2f} V')
             if count == 30:
                 break
-        board.stop()
-        print(f'link: {board.link.state}, reason {board.link.reason}')
-        board.send(r4link.Command.clear())  # a stop is latched until E:CLEAR
+        board.osmc(1).set(0)
 
 
 if __name__ == '__main__':

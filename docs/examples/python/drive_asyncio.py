@@ -4,7 +4,7 @@
 import asyncio
 import sys
 
-from r4link import Command, aio
+from r4link import aio
 
 
 async def main(url: str) -> None:
@@ -20,9 +20,7 @@ async def main(url: str) -> None:
                 print(f'OSMC 1: {state.osmc1.pwm} {direction}, {state.ain24:.2f} V')
             if count == 30:
                 break
-        await board.stop()
-        print(f'link: {board.link.state}, reason {board.link.reason}')
-        await board.send(Command.clear())  # a stop is latched until E:CLEAR
+        await board.osmc(1).set(0)
 
 
 if __name__ == '__main__':

@@ -7,8 +7,8 @@ open(), send() and close() run on a thread of their own, and may wait, because t
 The heartbeats on such a transport need the interpreter. If a program keeps the interpreter busy for
 a second, the link is lost, and the board goes safe.
 
-If a method raises, the transport is down. on_event() reports the exception, and close() is called.
-Then open() is called five times a second until it returns.
+If a method raises, the transport is down, and on_event() reports the exception. If the transport
+was open, close() is called. Then open() is called five times a second until it returns.
 """
 from __future__ import annotations
 

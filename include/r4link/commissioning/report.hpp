@@ -74,8 +74,8 @@ struct Report {
   R4LINK_API std::vector<Found> found() const;
 };
 
-// The report's wiring with all learnt changes. If things were exchanged, check all of them:
-// otherwise a place serves two signals, and check() reports a fault.
+// The report's wiring with all learnt changes. If two things were exchanged, the report needs the
+// checks of both things: otherwise a place serves two signals, and check() reports a fault.
 R4LINK_API Wiring learnt_wiring(const Report& report);
 
 R4LINK_API std::string write_json(const Report& report);

@@ -60,9 +60,9 @@ class R4LINK_API SteeringSensor {
  public:
   struct Calibration {
     double left_volts = 0;   // at left_rad
-    double left_rad = 0;     // above 0
+    double left_rad = 0;     // above right_rad
     double right_volts = 0;  // at right_rad
-    double right_rad = 0;    // below 0
+    double right_rad = 0;
     // A voltage farther outside means an unplugged cable or a broken sensor.
     double margin_volts = 0.3;
   };

@@ -36,10 +36,10 @@ enum class FieldForm : std::uint8_t {
   drive,   // Drive: pwm,direction
   bldc,    // Bldc: speed,direction,brake
   servo,   // uint16, 0-2500
-  u8,      // uint8
-  u16,     // uint16
-  i32,     // int32
-  u32,     // uint32
+  u8,
+  u16,
+  i32,
+  u32,
   reason,  // SafeReason
   fault,   // ChipFault: chip,trouble
   // devices on the user's bus and UARTs (docs/how-to/devices.md)

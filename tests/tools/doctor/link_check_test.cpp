@@ -74,8 +74,8 @@ TEST(DoctorLink, IsAWarningIfTheBoardAnswersTooLate) {
   LinkSample sample = well();
   sample.answer_us = 251000;
   EXPECT_EQ(verdict(sample),
-            "warning link.answer: the board answers after 251 ms, and refuses commands that are "
-            "older than 250 ms\n");
+            "warning link.answer: the board answers after 251 ms: commands take effect late, and a "
+            "board with a key refuses them\n");
 }
 
 TEST(DoctorLink, IsANoteIfTheBoardWasNotAsked) {

@@ -171,7 +171,7 @@ int mend(const Findings& findings, bool json) {
   return mended;
 }
 
-// Fixes call r4 by its name, and PATH may not contain its folder.
+// A fix calls r4 by its name, but the folder of r4 may be missing from PATH.
 void put_r4_into_the_path() {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);

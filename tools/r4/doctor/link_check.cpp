@@ -26,7 +26,7 @@ constexpr double some_loss = 0.005;
 constexpr double much_jitter_us = 15000;
 // Replaces the missing bit rate of a virtual bus.
 constexpr std::uint32_t doctor_bit_rate = 1'000'000;
-// A board does not execute older commands.
+// A board with a key refuses a host with a longer round trip.
 constexpr double slow_answer_us = 250'000;
 // Within this time a board can answer a question.
 constexpr double asked_for_s = 1;
@@ -191,8 +191,8 @@ Findings judge_link(const std::string& url, const LinkSample& sample) {
         ErrorKind::refused));
   } else if (sample.answer_us > slow_answer_us) {
     findings.push_back(found(url, Severity::warning, "link.answer",
-                             fmt::format("the board answers after {:.0f} ms, and refuses commands "
-                                         "that are older than 250 ms",
+                             fmt::format("the board answers after {:.0f} ms: commands take effect "
+                                         "late, and a board with a key refuses them",
                                          sample.answer_us / 1000),
                              fmt::format("r4 bench {}", url)));
   }

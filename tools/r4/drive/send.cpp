@@ -66,10 +66,10 @@ Order order_of(const std::string& text, const std::string& url) {
 
 bool turns_a_motor(const Command& command) {
   switch (command.kind) {
-    case CommandKind::osmc:
-    case CommandKind::dhb12:
-    case CommandKind::bldc:
-      return command.value != 0;
+#define R4_OUTPUT(kind, Value, member, channels, motor) \
+  case CommandKind::kind:                               \
+    return (motor) && command.value != 0;
+#include "r4link/tables/board.def"
     case CommandKind::stepper:
       return true;
     default:

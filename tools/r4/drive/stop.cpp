@@ -60,7 +60,8 @@ void print_confirmed(const StopOptions& options, const CommandResult& result) {
   } else {
     print_text(
         "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
-        "it stays stopped until: r4 send {} E:CLEAR\n",
+        "it stays stopped until: r4 send {} E:CLEAR\n"
+        "or until the program in control calls arm(): end that program first\n",
         ms, join_paths(options.urls));
   }
 }
@@ -99,7 +100,8 @@ int stop(const StopOptions& options) {
 constexpr const char* stop_footer =
     R"(The stop works even if another host controls the board, and does not wait for a link. r4 repeats the stop
 every 20 ms until the board reports that it has obeyed this stop, and for a moment longer. The board stays
-stopped until E:CLEAR. If the URLs are paths to one board, one working path is enough.
+stopped until E:CLEAR. The program in control can send E:CLEAR, also by arm(). If the URLs are paths to one
+board, one working path is enough.
 
 Examples:
   r4 stop udp://192.168.0.125

@@ -112,7 +112,7 @@ int diff(const WiringOptions& options) {
 int give_file(const WiringOptions& options) {
   give(options.second, load_wiring(options.first));
   print_text(
-      "the board has stored this wiring, and uses it after its next start\n"
+      "the board stores this wiring within two seconds, and uses it after its next start\n"
       "first switch the outputs off:   r4 stop {}\n"
       "then press reset, or disconnect the power\n",
       options.second);
@@ -152,7 +152,8 @@ int confirm(const WiringOptions& options) {
   }
   give(options.first, kept.wiring);
   print_text(
-      "the board has stored the plan as its wiring, and drives its outputs after its next start\n"
+      "the board stores the plan as its wiring within two seconds, and drives its outputs after "
+      "its next start\n"
       "until then, clear the fault: r4 send {} E:CLEAR\n",
       options.first);
   return 0;

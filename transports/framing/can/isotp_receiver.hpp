@@ -4,7 +4,7 @@
 //     idle -------------> owing ----------> offered ------------------------------> receiving
 //       |                 ^   ^                |                                    |   |   ^
 //       |                 |   '----------------'                                    |   '---'
-//       |                 |    frame_sent(): wait          the last one of a block  |   consecutive
+//       |                 |    frame_sent(): wait            a block's last frame   |   consecutive
 //       |                 '---------------------------------------------------------'   frame
 //       |                          first frame, listen only                         ^
 //       '---------------------------------------------------------------------------'
@@ -21,12 +21,13 @@
 // A delivered datagram equals the sent datagram. Any error is counted and delivers nothing. There
 // is one exception, because ISO-TP distinguishes frames by four bits only. A frame 16 (32, 48 …)
 // places later in the same stream is accepted as the expected frame. Loss alone causes the
-// exception only without flow control and only across two transfers. The end of one transfer, the
-// first frame of the next, and as many further frames as the numbers need must be lost, all within
-// N_Cr. Then the datagram mixes both transfers. If both have n frames, n (or n - 16, n - 32 …, but
-// at least 2) frames in a row must be lost. An N_Cr below the pause of transfers prevents this.
-// With flow control, a flow control must arrive after N_Bs, when the sender has begun another
-// transfer, whose first frame must also be lost. The datagram's CRC detects both cases.
+// exception only without flow control and only across two transfers, if the end of one transfer,
+// the first frame of the next transfer and as many further frames as the numbers need are lost
+// within N_Cr. Then the datagram mixes both transfers. If both have n frames, n (or n - 16,
+// n - 32 …, but at least 2) frames in a row are lost. An N_Cr below the pause of transfers prevents
+// this. With flow control, the exception needs a flow control that arrives after N_Bs. By then the
+// sender has begun another transfer, whose first frame is lost, too. The datagram's CRC detects
+// both cases.
 #pragma once
 
 #include <cstdint>

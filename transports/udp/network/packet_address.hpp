@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The own address to which a packet was sent and from which its answer leaves. A host accepts only
-// answers from that address. A socket bound to all addresses would answer from the route's address.
+// This computer's address to which a packet was sent, and from which its answer leaves. A host
+// accepts answers from that address only. A socket bound to all addresses would answer from the
+// route's address.
 #pragma once
 
 #include <asio/ip/address.hpp>
