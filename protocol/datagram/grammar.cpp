@@ -13,12 +13,16 @@ const ByteClasses byte_classes;
 
 namespace {
 
-// Marks the separators among the 16 bytes at `at`, in the bits from `shift` on.
-inline void add_separators(const char* at, unsigned shift, Separators& out) {
+constexpr unsigned lane = 16;
+
+// Marks the separators among the 16 bytes at `at` except the first `surplus`, in the bits from
+// `shift` on.
+inline void add_separators(const char* at, unsigned surplus, unsigned shift, Separators& out) {
   const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(at));
   const auto equal = [&](char c) { return _mm_cmpeq_epi8(bytes, _mm_set1_epi8(c)); };
   const auto bits = [&](__m128i mask) {
-    return static_cast<std::uint64_t>(static_cast<unsigned>(_mm_movemask_epi8(mask))) << shift;
+    return static_cast<std::uint64_t>(static_cast<unsigned>(_mm_movemask_epi8(mask)) >> surplus)
+           << shift;
   };
   const __m128i semicolon = equal(';');
   // The comparison is signed, so bytes from 0x80 are included.
@@ -36,23 +40,22 @@ inline void add_separators(const char* at, unsigned shift, Separators& out) {
 
 Separators separators(Text text, std::size_t at) {
   Separators out{0, 0, 0, 0};
-  char copy[separators_block];
-  const char* block = text.data() + at;
-  const std::size_t left = text.size() - at;
-  unsigned surplus = 0;  // bytes before `at`, read so that no byte after the text is read
-  if (text.size() < separators_block) {
-    std::memset(copy, 'x', sizeof copy);  // valid in a name and a value, not a separator
-    std::memcpy(copy, block, left);
-    block = copy;
-  } else if (left < separators_block) {
-    surplus = static_cast<unsigned>(separators_block - left);
-    block -= surplus;
+  char copy[lane] = {};
+  const Text block = text.substr(at, separators_block);
+  unsigned shift = 0;
+  for (; shift + lane <= block.size(); shift += lane) {
+    add_separators(block.data() + shift, 0, shift, out);
   }
-  for (unsigned shift = 0; shift < separators_block; shift += 16) {
-    add_separators(block + shift, shift, out);
+  if (shift == block.size()) return out;
+  // The last bytes are read with the bytes before them, so that no byte after the text is read.
+  const char* from = copy;
+  if (text.size() < lane) {
+    std::memcpy(copy + lane - block.size(), block.data(), block.size());
+  } else {
+    from = block.end() - lane;
   }
-  return {out.colons >> surplus, out.semicolons >> surplus, out.no_name >> surplus,
-          out.no_field >> surplus};
+  add_separators(from, lane - (static_cast<unsigned>(block.size()) - shift), shift, out);
+  return out;
 }
 
 #else
