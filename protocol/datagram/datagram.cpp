@@ -114,6 +114,7 @@ bool read_field(Text text, Field& out) {
 }
 
 Datagram& Datagram::operator=(const Datagram& other) {
+  if (this == &other) return *this;
   const std::size_t size = other.facts_.fields.size();
   for (std::size_t word = 0; word * 64 < size; ++word) ends_[word] = other.ends_[word];
   // Member by member, because GCC copies the whole struct with a slow string instruction.

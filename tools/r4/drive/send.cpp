@@ -65,16 +65,10 @@ Order order_of(const std::string& text, const std::string& url) {
 }
 
 bool turns_a_motor(const Command& command) {
-  switch (command.kind) {
-#define R4_OUTPUT(kind, Value, member, channels, motor) \
-  case CommandKind::kind:                               \
-    return (motor) && command.value != 0;
+#define R4_OUTPUT(output, Value, member, channels, motor) \
+  if (command.kind == CommandKind::output) return (motor) && command.value != 0;
 #include "r4link/tables/board.def"
-    case CommandKind::stepper:
-      return true;
-    default:
-      return false;
-  }
+  return command.kind == CommandKind::stepper;
 }
 
 bool turns_a_motor(const Setpoints& group) {
