@@ -187,6 +187,7 @@ class Application {
   StateSchedule schedule_;
   Setpoints setpoints_;
   Outputs outputs_;
+  bool rezeroed_ = false;  // a Z has moved a stepper's zero: an equal setpoint is another position
   Inputs inputs_;
   PortSlot ports_[max_ports];
   std::uint8_t port_count_ = 0;

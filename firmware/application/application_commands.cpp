@@ -153,6 +153,7 @@ void Application::take_effect(std::uint32_t pnum, const Command& command, std::u
   switch (command.kind) {
     case CommandKind::zero:
       hal_.zero(command.channel);
+      rezeroed_ = true;
       break;
     case CommandKind::clear:
       clear();

@@ -116,7 +116,8 @@ void Application::update_outputs(std::uint32_t now_ms) {
   static const Outputs off;
   const bool live = state() == BoardState::active;
   const Outputs& wanted = live ? setpoints_.outputs : off;
-  const bool changed = wanted != outputs_;
+  const bool changed = wanted != outputs_ || rezeroed_;
+  rezeroed_ = false;
   if (!changed && live == outputs_live_) return;
   outputs_ = wanted;
   if (live != outputs_live_) {

@@ -140,5 +140,17 @@ TEST_F(ApplicationGroup, AppliesItsCommandsInOrder) {
   EXPECT_FALSE(board.outputs().stepper[0].enabled);
 }
 
+// The second move begins at the new zero. Otherwise a later command would begin it.
+TEST_F(ApplicationGroup, MovesAStepperByTheSameStepsAgain) {
+  for (int moves = 0; moves < 3; ++moves) {
+    const int applied = board.hal.applied;
+    host.command("Z:1;P:200,500,1");
+    EXPECT_EQ(board.hal.applied, applied + 1);
+  }
+  const int applied = board.hal.applied;
+  board.run(100);
+  EXPECT_EQ(board.hal.applied, applied);
+}
+
 }  // namespace
 }  // namespace r4
