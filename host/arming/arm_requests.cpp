@@ -96,10 +96,10 @@ void ArmRequests::disarm(DisarmCause cause) {
 }
 
 // A reason from before the control of this session may be older than the session.
-void ArmRequests::on_link(bool up, bool in_control, bool safe, SafeReason reason) {
+void ArmRequests::on_link(bool up, bool in_control, bool safe, SafeReason reason, Time now) {
   if (!up) machine_.on_outage();
   if (in_control) machine_.on_heard(reason);
-  if (safe) machine_.on_reason(reason);
+  if (safe && machine_.on_reason(reason)) end(Outcome::not_armed, Refusal::none, now);
   report();
 }
 

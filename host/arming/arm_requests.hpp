@@ -60,7 +60,7 @@ class ArmRequests {
   void disarm(DisarmCause cause);
   void on_sleep() { machine_.on_sleep(); }
   void begin_anew();
-  void on_link(bool up, bool in_control, bool safe, SafeReason reason);
+  void on_link(bool up, bool in_control, bool safe, SafeReason reason, Time now);
   void on_supply(bool closed) { machine_.on_supply(closed); }
   void report();
 

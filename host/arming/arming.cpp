@@ -50,9 +50,12 @@ void ArmingMachine::disarm(DisarmCause cause) {
   if (armed() || cause_ == DisarmCause::not_yet) cause_ = cause;
 }
 
-void ArmingMachine::on_reason(SafeReason reason) {
+bool ArmingMachine::on_reason(SafeReason reason) {
   const DisarmCause cause = meaning_of(reason).cause;
-  if (cause != DisarmCause::none && armed()) cause_ = cause;
+  const bool closing = attempt_ == Attempt::closing;
+  if (cause == DisarmCause::none || (!armed() && !closing)) return false;
+  cause_ = cause;
+  return closing;
 }
 
 void ArmingMachine::on_heard(SafeReason reason) {

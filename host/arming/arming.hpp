@@ -40,8 +40,9 @@ class ArmingMachine {
   DisarmCause cause() const { return cause_; }
 
   void disarm(DisarmCause cause);
-  // The board's newest reason for the safe state.
-  void on_reason(SafeReason reason);
+  // The board's newest reason for the safe state. True if the reason ends an arm() that waits for
+  // R:1,On: relay 1 must not close when the cause ends.
+  bool on_reason(SafeReason reason);
   // The board reports the reason under this session's control.
   void on_heard(SafeReason reason);
   // This computer slept: a new session begins, and any cause may be older than the session.

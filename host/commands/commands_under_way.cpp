@@ -157,7 +157,10 @@ void CommandsUnderWay::repeat(Time now) {
   const bool gated = link_.gated(to_ms(now));
   for (Pending& pending : pending_.under_way()) {
     if (pending.stage == Stage::queued || now < pending.retry) continue;
-    if (gated && !is_urgent(pending.kind)) {
+    if (is_held_back(pending.kind) && !pending.is_step) {
+      // A repetition could drive an output after the cause that disarmed the program has ended.
+      finish(pending, Outcome::cancelled, Refusal::none, now);
+    } else if (gated && !is_urgent(pending.kind)) {
       pending.retry = now + options_.command_retry;
     } else {
       transmit(pending, now);

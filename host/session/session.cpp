@@ -85,7 +85,7 @@ Time Session::next_poll(Time now) {
 void Session::refresh(Time now) {
   keeper_.update();
   arming_.on_link(keeper_.is_up(), keeper_.in_control(now), link_.state() == HostLinkState::safe,
-                  link_.reason());
+                  link_.reason(), now);
   const LinkStatus fresh = keeper_.status(board_.state().fault, now);
   if (fresh == status_) return;
   status_ = fresh;

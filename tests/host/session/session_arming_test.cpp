@@ -185,6 +185,30 @@ TEST_P(ArmingMeanwhile, DoesNotClearAStopPressedDuringArming) {
   EXPECT_EQ(link.count('R'), 0U);
 }
 
+TEST_F(SessionArming, AReleasedHandleEndsAnArmWhoseRelayIsNotConfirmed) {
+  const Ticket ticket = arm();
+  ASSERT_EQ(link.count('R'), 1U);  // lost
+  link.heartbeat(SafeReason::handle);
+  link.pass(1ms);
+  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::handle);
+  link.heartbeat();  // the handle is held again
+  link.pass(500ms);
+  EXPECT_EQ(link.count('R'), 1U);
+}
+
+TEST_F(SessionArming, DoesNotRepeatAnOutputCommandAfterItIsDisarmed) {
+  armed();
+  const Ticket ticket = link.session.send(turn_motor, 3s, link.now);
+  link.pass(1ms);
+  ASSERT_EQ(link.count('O'), 1U);  // lost
+  link.heartbeat(SafeReason::handle);
+  link.heartbeat();
+  link.pass(500ms);
+  EXPECT_EQ(link.count('O'), 1U);
+  EXPECT_EQ(outcome(ticket), Outcome::cancelled);
+}
+
 TEST_F(SessionArming, DoesNotWaitForALaterEClear) {
   link.heartbeat(SafeReason::stop);
   const Ticket ticket = link.session.arm(1s, link.now);
