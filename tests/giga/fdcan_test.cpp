@@ -55,6 +55,20 @@ TEST(CanBitTiming, SamplesAt86Point7Percent) {
   EXPECT_FALSE(giga::can_bit_timing(60500000, 1000000).valid) << "not a whole number";
 }
 
+TEST(Fdcan, DoesNotLoseAStopThatArrivesInTheHandler) {
+  constexpr std::uint32_t fifo1_new = 1U << 4;
+  Controller c;
+  const std::uint32_t before = FDCAN2->IR.value & ~fifo1_new;
+  FDCAN2->IR.value = before;
+  FDCAN2->IR.on_read = [before] {
+    FDCAN2->IR.value |= fifo1_new;  // just after the handler has read the register
+    return before;
+  };
+  EXPECT_FALSE(c.can.on_interrupt());
+  FDCAN2->IR.on_read = nullptr;
+  EXPECT_TRUE(c.can.on_interrupt()) << "the request is still there";
+}
+
 TEST(Fdcan, WritesTheTimingInTheFormatOfTheRegister) {
   Controller c;
   EXPECT_EQ(FDCAN2->NBTP.value, 7U << 25 | 0U << 16 | 50U << 8 | 7U);

@@ -231,9 +231,10 @@ Fdcan::Event Fdcan::poll(std::uint32_t now_us) {
 }
 
 bool Fdcan::on_interrupt() {
-  const bool stop = (registers_.IR & ir_fifo1_new) != 0;
-  registers_.IR = ir_fifo0_new | ir_fifo1_new | ir_bus_off;
-  return stop;
+  // Clears only what was seen, because a stop may arrive meanwhile.
+  const std::uint32_t seen = registers_.IR & (ir_fifo0_new | ir_fifo1_new | ir_bus_off);
+  registers_.IR = seen;
+  return (seen & ir_fifo1_new) != 0;
 }
 
 CanState Fdcan::state() const {
