@@ -176,11 +176,11 @@ void check_encoder(Checking& c, int channel) {
   c.select_fields("ENC1,ENC2,ENC3,ENC4,ENC1IDX,ENC2IDX,ENC3IDX,ENC4IDX");
   States states{c.collect(50ms).back()};
   c.board.forget_states();
-  c.require(Topic::wheel_turned,
-            fmt::format("Turn the wheel of encoder {} forward by hand, one full turn within a few "
-                        "seconds, and confirm.",
-                        channel),
-            "the wheel was not turned");
+  c.require_connected(
+      Topic::wheel_turned,
+      fmt::format("Turn the wheel of encoder {} forward by hand, one full turn within a few "
+                  "seconds, and confirm (n: no encoder is connected).",
+                  channel));
   const States turning = states_until_now(c);
   states.insert(states.end(), turning.begin(), turning.end());
   const auto range = [&](int encoder) {
@@ -213,11 +213,11 @@ void check_encoder(Checking& c, int channel) {
 void check_ultrasonic(Checking& c, int channel) {
   constexpr Duration readings = 800ms;  // three readings of each sensor
   c.select_fields("US1,US2,US3,US4");
-  c.require(Topic::hand_before_sensor,
-            fmt::format("Hold your hand still, about 20 cm in front of ultrasonic sensor {}, and "
-                        "confirm while the hand is there.",
-                        channel),
-            "a hand was not in front of the sensor");
+  c.require_connected(
+      Topic::hand_before_sensor,
+      fmt::format("Hold your hand still, about 20 cm in front of ultrasonic sensor {}, and confirm "
+                  "while the hand is there (n: no sensor is connected).",
+                  channel));
   c.collect(300ms);  // time for one reading of each sensor
   c.board.forget_states();
   const States with_hand = c.collect(readings);

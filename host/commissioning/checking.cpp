@@ -65,6 +65,10 @@ void Checking::require(Topic topic, std::string text, const char* otherwise) {
   if (!confirms(topic, std::move(text))) give_up(Status::not_done, otherwise);
 }
 
+void Checking::require_connected(Topic topic, std::string text) {
+  if (!confirms(topic, std::move(text))) give_up(Status::skipped, "nothing is connected");
+}
+
 double Checking::number(Topic topic, std::string text, std::string unit) {
   Question question{topic, Question::Kind::number};
   question.text = std::move(text);

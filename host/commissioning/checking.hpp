@@ -35,6 +35,8 @@ class Checking {
   bool confirms(Topic topic, std::string text);
   // Unless the person confirms, ends the check with the note `otherwise`.
   void require(Topic topic, std::string text, const char* otherwise);
+  // As require(), but the answer no skips the check: nothing is connected.
+  void require_connected(Topic topic, std::string text);
   double number(Topic topic, std::string text, std::string unit);
   // The thing that moved or clicked; no value if nothing did. Gives up if nothing is connected.
   std::optional<Thing> which(Thing commanded, std::string text);

@@ -442,6 +442,24 @@ TEST(Commissioning, OffersNothingToAnotherBoard) {
             ErrorKind::usage);
 }
 
+TEST(Commissioning, SkipsASensorThatIsNotConnected) {
+  Bench bench({});
+  SimulatedPerson person(bench);
+  person.otherwise = [](const commissioning::Question& question) {
+    using commissioning::Topic;
+    const bool sensor =
+        question.topic == Topic::wheel_turned || question.topic == Topic::hand_before_sensor;
+    return sensor ? std::optional(commissioning::Answer()) : std::nullopt;  // no
+  };
+  Commissioning commissioning(bench, person);
+  commissioning.run_all({"encoder 2", "ultrasonic 3"});
+  for (const auto& each : commissioning.report().checks) {
+    EXPECT_EQ(each.status, commissioning::Status::skipped) << each.id;
+    EXPECT_EQ(each.note, "nothing is connected") << each.id;
+  }
+  EXPECT_EQ(commissioning.report().checks.size(), 2U);
+}
+
 TEST(Commissioning, CanBeSkippedRepeatedLeftAndResumed) {
   Bench bench({});
   SimulatedPerson person(bench);
