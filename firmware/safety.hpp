@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Why the outputs are safe: causes, each latched until its own end (docs/reference/safety.md).
 //     cause      enters                                   leaves                      setpoints
-//     link       no host is in control: at boot, after    a host takes control        kept
-//                its silence, farewell or lost paths
+//     link       no host is in control: at boot, or it    a host takes control        kept
+//                is silent, has left or lost its paths
 //     handle     dead-man's handle released               handle held again            cleared
 //     proximity  obstacle nearer than a threshold, or     5 cm beyond it for 500 ms,  cleared
 //                a sensor with a threshold is blind       or threshold off

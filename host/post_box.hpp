@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bounded queue of commands from any thread to a loop. Allocates only for commands with texts. A
-// command that waits for longer than `oldest`, because the loop stands still, is not delivered.
+// A bounded queue of commands from any thread to a loop. Allocates only for commands with texts. If
+// the loop stands still, a command that waits for longer than `oldest` is late, unless it switches
+// outputs off.
 #pragma once
 
 #include <asio/bind_allocator.hpp>
@@ -15,6 +16,7 @@
 #include <variant>
 #include <vector>
 
+#include "commands/switches_off.hpp"
 #include "r4link/command.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/setpoints.hpp"
@@ -31,10 +33,10 @@ class PostBox {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t capacity = 256;
-  static constexpr std::chrono::milliseconds oldest{100};  // as SendQueue
+  static constexpr std::chrono::milliseconds oldest{100};  // as in SendQueue
 
-  // On the loop, `deliver` is called for each command or group; `late`: it waited too long. A stop
-  // is never late. The loop must end before the box.
+  // On the loop, `deliver` is called for each command or group; `late`: it waited too long. The
+  // loop must end before the box.
   using Deliver = std::function<void(const CommandOrGroup& what, bool late)>;
   PostBox(asio::io_context& io, Deliver deliver, Clock::time_point (*now)() = &Clock::now)
       : io_(io), deliver_(std::move(deliver)), now_(now) {
@@ -45,7 +47,7 @@ class PostBox {
   // From any thread. False if the box is full. A stop is never refused, and is delivered first.
   bool put(const CommandOrGroup& what) {
     const std::lock_guard lock(mutex_);
-    if (is_stop(what)) waiting_.clear();
+    if (first_of(what).kind == CommandKind::stop) waiting_.clear();
     if (waiting_.size() >= capacity) return false;
     waiting_.push_back({what, now_()});
     if (std::exchange(woken_, true)) return true;
@@ -60,10 +62,6 @@ class PostBox {
     Clock::time_point at;
   };
 
-  static bool is_stop(const CommandOrGroup& what) {
-    return first_of(what).kind == CommandKind::stop;
-  }
-
   void deliver() {
     {
       const std::lock_guard lock(mutex_);
@@ -73,7 +71,8 @@ class PostBox {
     }
     const Clock::time_point now = now_();
     for (const Letter& letter : taken_) {
-      deliver_(letter.what, now - letter.at > oldest && !is_stop(letter.what));
+      const bool off = std::visit([](const auto& each) { return switches_off(each); }, letter.what);
+      deliver_(letter.what, now - letter.at > oldest && !off);
     }
     taken_.clear();
   }

@@ -6,6 +6,7 @@
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/site_settings.hpp"
 #include "r4link/tables/commands.hpp"
+#include "switches_off.hpp"
 
 namespace r4 {
 
@@ -157,7 +158,9 @@ void CommandsUnderWay::repeat(Time now) {
   const bool gated = link_.gated(to_ms(now));
   for (Pending& pending : pending_.under_way()) {
     if (pending.stage == Stage::queued || now < pending.retry) continue;
-    if (is_held_back(pending.kind) && !pending.is_step) {
+    const bool off =
+        pending.is_group() ? switches_off(pending.group) : switches_off(pending.command);
+    if (is_held_back(pending.kind) && !pending.is_step && !off) {
       // A repetition could drive an output after the cause that disarmed the program has ended.
       finish(pending, Outcome::cancelled, Refusal::none, now);
     } else if (gated && !is_urgent(pending.kind)) {

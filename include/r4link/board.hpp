@@ -164,8 +164,8 @@ class R4LINK_API Board {
   void send(std::string_view text, Duration timeout = default_timeout);
   // Sends once, without confirmation, for streams of setpoints. If the command is not sent, returns
   // the reason. If 256 commands wait, the reason is queue_full. on_refused() reports commands that
-  // the board refuses, or that were not sent within 100 ms. A stop is repeated as by stop_async().
-  // Allocates nothing.
+  // the board refuses, or that were not sent within 100 ms. A command that switches an output off
+  // may be sent later. A stop is repeated as by stop_async(). Allocates nothing.
   PostResult post(const Command& command);
   PostResult post(const Setpoints& setpoints);
 

@@ -137,7 +137,7 @@ enum class DisarmCause : std::uint8_t {
   // Causes that may be older than the program: arm() does not clear them, Command::clear() does.
   earlier_stop,
   earlier_watchdog,
-  earlier_fault,  // may also be of the board's start
+  earlier_fault,  // or a fault with which the board begins
 };
 // "stop", "not yet", "earlier stop" …
 R4LINK_API const char* to_text(DisarmCause cause);
@@ -172,7 +172,9 @@ class PostResult {
     no_link,    // the link is not up, or the board does not accept this host's commands
     // too many commands wait, or a group waits or is sent one by one: try again later
     queue_full,
-    late,  // waited for more than 100 ms, because the thread of the link stood still
+    // waited for more than 100 ms, because the thread of the link stood still; not a command that
+    // switches an output off
+    late,
   };
   PostResult(Value value) : value_(value) {}        // NOLINT(google-explicit-constructor)
   operator bool() const { return value_ == sent; }  // NOLINT(google-explicit-constructor)

@@ -209,6 +209,15 @@ TEST_F(SessionArming, DoesNotRepeatAnOutputCommandAfterItIsDisarmed) {
   EXPECT_EQ(outcome(ticket), Outcome::cancelled);
 }
 
+TEST_F(SessionArming, StillRepeatsACommandThatSwitchesAnOutputOff) {
+  armed();
+  link.session.send(Command::servo(1, Microseconds(0)), 3s, link.now);
+  link.pass(1ms);
+  link.heartbeat(SafeReason::handle);
+  link.pass(500ms);
+  EXPECT_GT(link.count('S'), 2U);
+}
+
 TEST_F(SessionArming, DoesNotWaitForALaterEClear) {
   link.heartbeat(SafeReason::stop);
   const Ticket ticket = link.session.arm(1s, link.now);

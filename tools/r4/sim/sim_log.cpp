@@ -242,8 +242,8 @@ void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason
     return;
   }
   std::string text = to_text(state);
-  const bool told = reason != SafeReason::none && (reason != SafeReason::link || silent);
-  if (told) text += fmt::format(" ({})", to_text(reason));
+  const bool shown = reason != SafeReason::none && (reason != SafeReason::link || silent);
+  if (shown) text += fmt::format(" ({})", to_text(reason));
   if (silent) text += fmt::format(", the last heartbeat of the host was {} ms ago", silence_ms);
   print(t_ms, text);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The microseconds are of the core's timer and wrap after 71 minutes. Interrupts and fault handlers
-// may read them. The timer interrupt counts the milliseconds, which wrap after 49 days.
+// The core's timer counts the microseconds, which wrap after 71 minutes. Interrupts and fault
+// handlers may read them. The timer interrupt counts the milliseconds, which wrap after 49 days.
 #pragma once
 
 #include <cstdint>

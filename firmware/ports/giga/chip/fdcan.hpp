@@ -19,7 +19,7 @@
 namespace r4 {
 namespace giga {
 
-constexpr std::uint32_t can_bit_rate = 1000000;  // of all nodes of the bus
+constexpr std::uint32_t can_bit_rate = 1000000;  // for all nodes of the bus
 
 // Sample point at 86.7 %, as near as the clock allows.
 struct CanBitTiming {
