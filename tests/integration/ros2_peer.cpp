@@ -14,13 +14,19 @@
 // text or -. The peer also reports the endpoints of other participants,
 // {"type":"endpoint","kind":"writer","topic":…,"of":…,"user_data":…,"gid":…}, with "gone":true when
 // they end. The peer reports the participants, {"type":"participant","user_data":…,"gone":…}. The
-// domain is ROS_DOMAIN_ID, only on 127.0.0.1.
+// domain is ROS_DOMAIN_ID. The peer is set up as rmw_fastrtps sets up Fast DDS:
+//     ROS_AUTOMATIC_DISCOVERY_RANGE   not set      ROS_LOCALHOST_ONLY=1 of Humble: only 127.0.0.1
+//                                     LOCALHOST    from Iron on: all addresses, no multicast
+//                                     SUBNET       the default of ROS
+//     ROS_STATIC_PEERS                an address of another computer
 #if __has_include(<fastdds/utils/IPLocator.hpp>)
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.hpp>
 #include <fastdds/utils/IPLocator.hpp>
 #define FAST_DDS_3
 #else
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 #endif
 
@@ -277,13 +283,28 @@ class Peer {
  public:
   Peer() {
     DomainParticipantQos qos;
-    qos.transport().use_builtin_transports = false;
-    const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-    udp->interfaceWhiteList.emplace_back("127.0.0.1");
-    qos.transport().user_transports.push_back(udp);
-    rtps::Locator_t here;
-    rtps::IPLocator::setIPv4(here, 127, 0, 0, 1);
-    qos.wire_protocol().builtin.initialPeersList.push_back(here);
+    const char* const range = std::getenv("ROS_AUTOMATIC_DISCOVERY_RANGE");
+    if (range == nullptr || std::strcmp(range, "LOCALHOST") == 0) {
+      qos.transport().use_builtin_transports = false;
+      const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+      if (range == nullptr) {
+        udp->interfaceWhiteList.emplace_back("127.0.0.1");
+      } else {
+        udp->maxInitialPeersRange = 32;
+        qos.wire_protocol().builtin.metatrafficUnicastLocatorList.push_back(rtps::Locator_t());
+        qos.transport().user_transports.push_back(
+            std::make_shared<eprosima::fastdds::rtps::SharedMemTransportDescriptor>());
+      }
+      qos.transport().user_transports.push_back(udp);
+      rtps::Locator_t here;
+      rtps::IPLocator::setIPv4(here, 127, 0, 0, 1);
+      qos.wire_protocol().builtin.initialPeersList.push_back(here);
+    }
+    if (const char* const address = std::getenv("ROS_STATIC_PEERS"); address != nullptr) {
+      rtps::Locator_t there;
+      rtps::IPLocator::setIPv4(there, address);
+      qos.wire_protocol().builtin.initialPeersList.push_back(there);
+    }
     const std::string enclave = "enclave=/;";
     qos.user_data().data_vec(std::vector<rtps::octet>(enclave.begin(), enclave.end()));
     const char* const domain = std::getenv("ROS_DOMAIN_ID");

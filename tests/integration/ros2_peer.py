@@ -36,8 +36,8 @@ def own_domain():
 class Ros2(Running):
     """A running r4 ros2. `ready` is its first report."""
 
-    def __init__(self, domain, *arguments):
-        super().__init__('ros2', '--json', *arguments, env=domain)
+    def __init__(self, domain, *arguments, **process):
+        super().__init__('ros2', '--json', *arguments, env=domain, **process)
         self.domain = domain
         self.ready = self.next(lambda each: each['type'] == 'ready')
 
@@ -55,12 +55,12 @@ class Ros2(Running):
 
 
 class Peer:
-    def __init__(self, domain):
+    def __init__(self, domain, **process):
         assert os.path.exists(PROGRAM), (
             f'{PROGRAM} is not built, for which Fast DDS is needed\n  fix: install it (Debian 12 and Ubuntu: libfastrtps-dev; '
             'Debian 13: libfastdds-dev), then configure and build again')
         self.process = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-                                        env=domain)
+                                        env=domain, **process)
         self.lines = queue.Queue()
         self.endpoints = {}  # (kind, topic) -> the endpoint
         self.reader = threading.Thread(target=self._read, daemon=True)

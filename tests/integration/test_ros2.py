@@ -14,6 +14,7 @@ import types
 
 import pytest
 
+from lan import Lan
 from machine import within
 from r4_process import ERROR, PATIENCE_S, R4, Board, again, lasts, run
 from ros2_peer import (BOOL, DIAGNOSTICS, FLOAT32, INT32, LOG, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2,
@@ -37,6 +38,25 @@ def make_graph():
             yield board, ros2, peer
             assert ros2.end() == 0, ros2.errors
             peer.end()
+
+
+@pytest.mark.parametrize('reach', ['LOCALHOST', 'SUBNET'])
+def test_ros_on_this_computer_finds_the_node_and_other_computers_do_not(reach):
+    with Lan() as lan:
+        here, there = lan.computer('10.77.0.1').inside, lan.computer('10.77.0.2').inside
+        domain = own_domain()
+        ros = {**domain, 'ROS_AUTOMATIC_DISCOVERY_RANGE': reach}
+        other = {**domain, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_STATIC_PEERS': '10.77.0.1'}
+        with Board('udp://127.0.0.1:0', **here) as board, Peer(ros, **here) as peer, Peer(other, **there) as stranger:
+            with Ros2(domain, board.host_url, '--arm', **here) as ros2:
+                ros2.armed()
+                join(ros2, peer, 'osmc1/command', FLOAT32)
+                drive(board, peer, 'rt/osmc1/command', float32(0.1), lambda each: pwm(each, 1) != 0)
+                peer.read('rt/R4', STRING)
+                peer.sample('rt/R4')
+                stranger.endpoint('reader', 'rt/R4')  # the stranger finds ROS on this computer
+                assert ('writer', 'rt/R4') not in stranger.endpoints
+                assert ros2.end() == 0, ros2.errors
 
 
 def test_the_node_publishes_the_topics_of_the_paper(graph):
@@ -447,12 +467,12 @@ def test_the_wheel_speeds_example_keeps_the_commanded_speeds():
                 assert abs(duty) <= 1
                 speeds[i] += (duty * 30 * 0.75 - speeds[i]) * 0.1
         return speeds
-    assert drive(5, 0.5, 1.0) == pytest.approx([(0.5 - 0.21) / 0.05, -(0.5 + 0.21) / 0.05], rel=0.02)
+    assert drive(5, 0.5, 1.0) == pytest.approx([(0.5 - 0.21) / 0.05, (0.5 + 0.21) / 0.05], rel=0.02)
     drive(0.1, math.nan, 0)  # NaN is not a command
     drive(0.6)
     assert base.update(speeds, now) == [0, 0]  # without a new command the wheels are off
     assert drive(10, 9.0, 0.0)[0] == pytest.approx(22.5, rel=0.02)  # the highest speed
-    assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # the controller recovers from saturation
+    assert drive(5, 0.5, 0.0) == pytest.approx([10, 10], rel=0.05)  # the controller recovers from saturation
     base.command(1, 0, now)
     assert base.update((math.nan, 0), now) == [0, 0]
     base.supply = False

@@ -16,7 +16,7 @@ WHEEL_SEPARATION = 0.42  # m
 WHEEL_RADIUS = 0.05  # m
 FULL_SPEED = 30.0  # rad/s of a wheel at full duty
 CMD_VEL_TIMEOUT = 0.5  # s
-SIGNS = (1, -1)  # left, right: the right motor and its encoder are mounted the other way round
+SIGNS = (1, 1)  # left, right; -1 if forward on the motor drives the robot backward (not after r4 commission)
 
 
 class Wheel:

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "r4link/error.hpp"
-#include "tools/r4/ros2/graph/environment.hpp"
+#include "tools/r4/ros2/domain/environment.hpp"
 #include "tools/r4/ros2/graph/names.hpp"
 #include "tools/r4/ros2/graph/node_listing.hpp"
 #include "tools/r4/ros2/graph/outbox.hpp"

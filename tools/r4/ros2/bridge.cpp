@@ -18,7 +18,7 @@
 #include "discovery/discovery.hpp"
 #include "discovery/mismatches.hpp"
 #include "discovery/namesakes.hpp"
-#include "graph/environment.hpp"
+#include "domain/environment.hpp"
 #include "graph/graph.hpp"
 #include "graph/inbox.hpp"
 #include "graph/outbox.hpp"

@@ -48,7 +48,7 @@ struct Mismatch {
   Weight weight = Weight::warning;
   std::string text;  // begins with the node's name of the topic
 };
-// Handles a writer of another type, and may create a reader. Returns nothing if the type is wrong.
+// Called for a writer whose type differs from the topic's type. May create a reader for that type.
 using OtherType = std::function<std::optional<Mismatch>(const Announced& writer)>;
 
 // "std_msgs/msg/String" for "std_msgs::msg::dds_::String_". Any name becomes printable.

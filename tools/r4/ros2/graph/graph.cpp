@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "../domain/this_computer.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool::ros2 {
@@ -42,7 +43,10 @@ Entity join(const Domain& domain) {
   const std::string what = fmt::format("ROS domain {}", domain.id);
   require_low_descriptors(what);
   if (domain.configuration.empty()) return {};
-  return {dds_create_domain(domain.id, domain.configuration.c_str()), what};
+  const OnlyThisComputer only_this_computer;
+  Entity joined(dds_create_domain(domain.id, domain.configuration.c_str()), what);
+  if (domain.one_computer) only_this_computer.limit();
+  return joined;
 }
 
 Entity participant_of(const Domain& domain) {

@@ -13,9 +13,9 @@
 #include <string_view>
 #include <vector>
 
+#include "../domain/environment.hpp"
 #include "announced.hpp"
 #include "entity.hpp"
-#include "environment.hpp"
 #include "message_types.hpp"
 #include "names.hpp"
 #include "node_listing.hpp"

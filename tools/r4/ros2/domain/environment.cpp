@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "r4link/error.hpp"
+#include "this_computer.hpp"
 
 namespace r4::tool::ros2 {
 namespace {
@@ -88,6 +89,14 @@ std::string configuration(const std::string& general, const std::vector<std::str
       general, index, list, internal);
 }
 
+std::string elements(const std::vector<std::string>& interfaces) {
+  std::string list;
+  for (const std::string& name : interfaces) {
+    list += fmt::format("<NetworkInterface name=\"{}\" multicast=\"{}\"/>", name, name == "lo");
+  }
+  return list;
+}
+
 }  // namespace
 
 std::string process_environment(const char* name) {
@@ -112,7 +121,8 @@ Domain domain_of(const Environment& environment) {
         domain.reach = "this computer";
         domain.one_computer = true;
         domain.configuration = configuration(
-            R"(<Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces><AllowMulticast>spdp</AllowMulticast>)",
+            fmt::format("<Interfaces>{}</Interfaces><AllowMulticast>spdp</AllowMulticast>",
+                        elements(interfaces_of_this_computer())),
             {"127.0.0.1"});
       } else {
         domain.reach = named;
