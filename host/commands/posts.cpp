@@ -44,7 +44,7 @@ const Posts::Posted* Posts::take(std::uint32_t pnum) {
 PostResult Posts::result() {
   if (delivery_.result() == SendResult::sent) {
     ++counts_.commands;
-    return PostResult::sent;
+    return {PostResult::sent, delivery_.pnum()};
   }
   take(delivery_.pnum());
   return delivery_.result() == SendResult::full ? PostResult::queue_full : PostResult::no_link;

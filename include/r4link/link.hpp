@@ -176,14 +176,19 @@ class PostResult {
     // switches an output off
     late,
   };
-  PostResult(Value value) : value_(value) {}        // NOLINT(google-explicit-constructor)
+  PostResult(Value value, std::uint32_t pnum = 0)  // NOLINT(google-explicit-constructor)
+      : value_(value), pnum_(pnum) {}
   operator bool() const { return value_ == sent; }  // NOLINT(google-explicit-constructor)
   Value value() const { return value_; }            // for a switch
+  // Packet number of the sent command, as in CMD of the state. With Setpoints, of the last
+  // command. 0: not sent, a stop, or posted by a Board.
+  std::uint32_t pnum() const { return pnum_; }
   friend bool operator==(PostResult a, PostResult b) { return a.value_ == b.value_; }
   friend bool operator==(PostResult a, Value b) { return a.value_ == b; }
 
  private:
   Value value_;
+  std::uint32_t pnum_;
 };
 R4LINK_API const char* to_text(PostResult result);
 

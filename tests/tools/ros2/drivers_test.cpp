@@ -17,6 +17,7 @@ struct Driven {
   Drivers::Time now{1h};
   int topic = 0;
   int other_topic = 0;
+  std::uint32_t executed = 0;  // CMD of the board's states
 
   void sent(const Command& command, std::uint64_t publisher = 7) {
     drivers.on_sent(command, &topic, publisher, now);
@@ -25,6 +26,7 @@ struct Driven {
     State state;
     state.present.add(state_field(FieldKind::stepper, stepper));
     state.raw.stepper_steps[stepper - 1] = steps;
+    state.last_command = executed;
     drivers.on_state(state, now);
   }
   std::vector<std::string> to_stop() {
@@ -108,12 +110,43 @@ TEST(Ros2Drivers, IgnoreAStepperPositionFromBeforeItWasZeroed) {
   driven.sent(Command::zero(2));
   driven.drivers.on_publishers(&driven.topic, {});
   EXPECT_EQ(driven.to_stop(), Texts{});
-  driven.now += 20ms;
+  driven.now += 980ms;
   driven.told(2, 50020);  // this state is older than the zero command
   EXPECT_EQ(driven.to_stop(), Texts{});
-  driven.now += 80ms;
+  driven.now += 20ms;
   driven.told(2, 3);
-  EXPECT_EQ(driven.to_stop(), Texts{"P:3,1000,2"});
+  EXPECT_EQ(driven.to_stop(), Texts{"P:3,1000,2"}) << "the zero command may have been lost";
+}
+
+TEST(Ros2Drivers, UseAStepperPositionAsSoonAsTheBoardHasZeroedIt) {
+  constexpr std::uint32_t zero = 0xFFFFFFFF;
+  for (const std::uint32_t executed : {zero, 0U, 7U}) {
+    Driven driven;
+    driven.executed = zero - 1;
+    driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
+    driven.sent(Command::zero(2));
+    driven.drivers.on_number(Command::zero(2), zero);
+    driven.drivers.on_publishers(&driven.topic, {});
+    driven.now += 500ms;
+    driven.told(2, 50020);
+    EXPECT_EQ(driven.to_stop(), Texts{});
+    driven.now += 20ms;
+    driven.executed = executed;
+    driven.told(2, 3);
+    EXPECT_EQ(driven.to_stop(), Texts{"P:3,1000,2"}) << executed;
+  }
+}
+
+TEST(Ros2Drivers, DoNotWaitForANumberOfAnEarlierSession) {
+  Driven driven;
+  driven.sent(Command::zero(2));
+  driven.drivers.on_number(Command::zero(2), 500);
+  driven.drivers.forget();
+  driven.executed = 501;
+  driven.told(2, 50020);
+  driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
+  driven.drivers.on_publishers(&driven.topic, {});
+  EXPECT_EQ(driven.to_stop(), Texts{}) << "the zero command may be under way";
 }
 
 TEST(Ros2Drivers, DoNotStopIdleOutputsOrRelay1) {

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "r4link/commands/command_text.hpp"
-#include "r4link/error.hpp"
+#include "tests/support/problems.hpp"
 #include "tools/r4/ros2/bridge.hpp"
 #include "tools/r4/ros2/command_text.hpp"
 
@@ -92,13 +92,8 @@ TEST(Ros2CommandText, AStringMustEndWithItsOnlyNul) {
 
 TEST(Ros2CommandText, AnErrorDoesNotRepeatInvalidCharacters) {
   for (const char* wrong : {"O:\xff", "O:1,1,1;\xc3", "\x01"}) {
-    try {
-      (void)commands_of(wrong);
-      ADD_FAILURE() << wrong;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.problem().text(),
-                "a command: has characters that are not ASCII; write the command in ASCII");
-    }
+    EXPECT_EQ(test::problem_of([&] { (void)commands_of(wrong); }).text(),
+              "a command: has characters that are not ASCII; write the command in ASCII");
   }
 }
 
@@ -133,6 +128,10 @@ TEST(CounterPosition, BeginsWithTheCountAndFollowsItBothWays) {
   EXPECT_EQ(position.advance(-20, 7), -20);
   EXPECT_EQ(position.advance(3, 8), -20) << "a restart of the board must not move the position";
   EXPECT_EQ(position.advance(2, 8), -21);
+  constexpr std::int32_t last = std::numeric_limits<std::int32_t>::max();
+  Position over;
+  EXPECT_EQ(over.advance(last - 9, 7), last - 9);
+  EXPECT_EQ(over.advance(-last, 7), std::int64_t{last} + 2) << "the count has wrapped";
 }
 
 }  // namespace

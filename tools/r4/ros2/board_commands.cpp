@@ -133,9 +133,12 @@ void BoardCommands::post(std::size_t first, std::size_t count) {
   const Drivers::Time now = BootClock::now();
   for (std::size_t i = first; i < first + count; ++i) {
     const Setpoint& each = wanted_[i];
-    // A stop is repeated until the output rests, even if it could not be sent.
-    if (!result && !Drivers::rests(each.command)) continue;
+    // A stop is repeated until the output rests, even if it could not be sent. For a board without
+    // groups, Z may have been sent, although a later command could not be sent.
+    const bool zero = each.command.kind == CommandKind::zero;
+    if (!result && !zero && !Drivers::rests(each.command)) continue;
     drivers_.on_sent(each.command, each.source, each.publisher, now);
+    drivers_.on_number(each.command, result.pnum());
   }
 }
 

@@ -224,7 +224,11 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
       }
       setpoints.add(command);
     }
-    board_.async_send(setpoints, left, in_words(board_, setpoints, done));
+    const auto in_text = in_words(board_, setpoints, done);
+    board_.async_send(setpoints, left, [this, commands, in_text](const CommandResult& result) {
+      for (const OwnCommand& own : commands) drivers_.on_number(own, result.pnum);
+      in_text(result);
+    });
     if (board_.disarmed_by() != DisarmCause::none) return;
     for (const OwnCommand& own : commands) {
       drivers_.on_sent(own, source, origin.publisher, BootClock::now());

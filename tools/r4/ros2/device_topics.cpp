@@ -115,7 +115,7 @@ void DeviceTopics::publish_imu(const Topic& topic, const State& state, TimeMessa
   message.angular_velocity = {get("gyro_x"), get("gyro_y"), get("gyro_z")};
   if (topic.device.description().find("quat_w")) {
     message.orientation = {get("quat_x"), get("quat_y"), get("quat_z"), get("quat_w")};
-    // A BNO055 in configuration mode reports 0 for all (BST-BNO055-DS000, 3.3.1).
+    // A BNO055 in configuration mode reports 0 for all values (BST-BNO055-DS000, 3.3.1).
     const auto& [x, y, z, w] = message.orientation;
     if (x * x + y * y + z * z + w * w < 0.5) return;
   } else {

@@ -61,7 +61,7 @@ std::optional<Command> Drivers::stop_of(std::size_t index, Time now) const {
 void Drivers::on_sent(const Command& command, const void* source, std::uint64_t publisher,
                       Time now) {
   if (command.kind == CommandKind::zero) {
-    positions_[command.channel - 1U] = {0, std::nullopt, now + longest_way};
+    positions_[command.channel - 1U] = {0, std::nullopt, now + longest_way, 0};
   }
   const auto index = index_of(command);
   if (!index) return;
@@ -71,9 +71,20 @@ void Drivers::on_sent(const Command& command, const void* source, std::uint64_t 
   output = {rest ? Stage::stopping : Stage::driven, source, publisher, now, ++sent_, rest};
 }
 
+void Drivers::on_number(const Command& command, std::uint32_t pnum) {
+  if (command.kind != CommandKind::zero) return;
+  Position& position = positions_[command.channel - 1U];
+  if (position.zero == 0) position.zero = pnum;  // otherwise a later Z has been sent
+}
+
 void Drivers::on_state(const State& state, Time sampled) {
   for (int n = 1; n <= stepper_channels; ++n) {
     Position& position = positions_[static_cast<std::size_t>(n - 1)];
+    const auto after_zero = static_cast<std::int32_t>(state.last_command - position.zero);
+    if (position.zero != 0 && after_zero >= 0) {
+      position.counts_from = sampled;
+      position.zero = 0;
+    }
     if (!state.present.has(state_field(FieldKind::stepper, n)) || sampled < position.counts_from)
       continue;
     position.steps = state.steps(n);
@@ -90,7 +101,10 @@ void Drivers::on_publishers(const void* source, const std::vector<std::uint64_t>
   }
 }
 
-void Drivers::forget() { outputs_.fill({}); }
+void Drivers::forget() {
+  outputs_.fill({});
+  for (Position& position : positions_) position.zero = 0;  // a new session has other numbers
+}
 
 void Drivers::forget(const Command& command) {
   if (const auto index = index_of(command)) outputs_[*index] = {};

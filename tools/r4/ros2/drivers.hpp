@@ -44,6 +44,8 @@ class Drivers {
   static bool rests(const Command& command);
   // `source`: the topic; `publisher`: a publisher of that topic.
   void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
+  // If `command` is a Z, `pnum` is its packet number or a later one; 0: unknown.
+  void on_number(const Command& command, std::uint32_t pnum);
   void on_state(const State& state, Time sampled);
   void on_publishers(const void* source, const std::vector<std::uint64_t>& there);
   // Call when the outputs were made safe otherwise.
@@ -76,12 +78,13 @@ class Drivers {
   struct Position {
     std::int32_t steps = 0;
     std::optional<Time> sampled;
-    Time counts_from{};  // older samples count from another zero
+    Time counts_from{};      // older samples may count from another zero
+    std::uint32_t zero = 0;  // a state with this CMD or a later CMD counts from the newest zero
   };
   // With an older position a stepper would move instead of stop.
   static constexpr Duration oldest_position{250};
-  // Longest delay of Z: a state within this time may be older than Z.
-  static constexpr Duration longest_way{100};
+  // Z may be lost, and then no state shows its number. Z is not delayed for longer.
+  static constexpr Duration longest_way{1000};
   static constexpr std::size_t outputs = number_of_outputs();
   static std::optional<std::size_t> index_of(const Command& command);
   std::optional<Command> stop_of(std::size_t index, Time now) const;
