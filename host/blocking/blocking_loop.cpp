@@ -45,10 +45,11 @@ Error BlockingLoop::blocked_error(std::string_view what, std::string_view instea
 }
 
 void BlockingLoop::run(const CallPtr& call, Duration timeout) {
-  const auto deadline = call->called + bounded(timeout);
+  timeout = bounded(timeout);
+  const auto deadline = Clock::now() + timeout;
   std::unique_lock lock(mutex);
   if (closed) throw closed_error(call->text);
-  asio::post(io, [this, call, deadline] { begin(call, deadline); });
+  asio::post(io, [this, call, timeout] { begin(call, timeout); });
   const auto is_done_by = [&](Clock::time_point time) {
     return wait_until(lock, call->ended, time, on_wait, [&] { return call->left == 0; });
   };
@@ -78,7 +79,7 @@ void BlockingLoop::run(const CallPtr& call, Duration timeout) {
 }
 
 void BlockingLoop::run_unawaited(const CallPtr& call) {
-  post_to_loop([this, call, deadline = call->called + patience] { begin(call, deadline); });
+  post_to_loop([this, call] { begin(call, patience); });
 }
 
 bool BlockingLoop::post_to_loop(std::function<void()> action) {
@@ -106,8 +107,8 @@ bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()
   return true;
 }
 
-void BlockingLoop::begin(const CallPtr& call, Clock::time_point deadline) {
-  auto left = std::chrono::ceil<Duration>(deadline - Clock::now());
+void BlockingLoop::begin(const CallPtr& call, Duration timeout) {
+  auto left = std::chrono::ceil<Duration>(call->called + timeout - BootClock::now());
   {
     const std::lock_guard lock(mutex);
     if (!call->stop && (call->abandoned || left <= Duration{0})) return;
@@ -129,7 +130,7 @@ void BlockingLoop::end(Call& call, std::size_t part, const CommandResult& result
   const std::lock_guard lock(mutex);
   Part& ended = call.parts[part];
   ended.result = result;
-  ended.result.elapsed = std::chrono::duration_cast<Time>(Clock::now() - call.called);
+  ended.result.elapsed = std::chrono::duration_cast<Time>(BootClock::now() - call.called);
   ended.link = ended.board->link();
   on_end();
   if (--call.left == 0) call.ended.notify_all();

@@ -5,7 +5,8 @@
 //        waits  <--- end() ------       each part ends
 //
 // A caller gives up at its deadline, or when on_wait() throws. Then a call that has not begun never
-// begins, and a begun call is cancelled. A stop is sent, however late.
+// begins, and a begun call is cancelled. After a sleep of this computer, a call whose time is over
+// does not begin. A stop is sent, however late.
 #pragma once
 
 #include <algorithm>
@@ -74,7 +75,7 @@ class BlockingLoop {
     bool begun = false;
     bool abandoned = false;
     std::condition_variable ended;
-    const Clock::time_point called = Clock::now();
+    const BootClock::time_point called = BootClock::now();
   };
   static Start start_of(CommandOrGroup what);
 
@@ -154,7 +155,7 @@ class BlockingLoop {
   // The longest wait of close() for the boards' reports that they are free.
   static constexpr Duration farewell_limit{100};
   void shut(const std::vector<AsyncBoard*>& boards);
-  void begin(const CallPtr& call, Clock::time_point deadline);
+  void begin(const CallPtr& call, Duration timeout);
   void end(Call& call, std::size_t part, const CommandResult& result);
   Error blocked_error(std::string_view what, std::string_view instead, std::string_view fix) const;
 

@@ -5,16 +5,21 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <asio/io_context.hpp>
 #include <atomic>
 #include <ctime>
+#include <future>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
 #include "r4link/control/boot_clock.hpp"
 #include "r4link/error.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/held_carrier.hpp"
 #include "tests/support/on_a_loop.hpp"
 
 namespace {
@@ -94,6 +99,29 @@ TEST_F(AsyncBoardSleep, CancelsCommandsAndWaits) {
   slept_seconds += 3;
   ASSERT_TRUE(run_until([&] { return ends.size() == 3; }));
   EXPECT_EQ(ends, std::vector<Outcome>(3, Outcome::cancelled));
+}
+
+TEST(BoardSleep, DoesNotBeginACallAfterASleep) {
+  BoardInAThread simulated("udp");
+  Hold hold;
+  std::atomic<int> waits{0};
+  BoardOptions options;
+  options.on_wait = [&] {
+    ++waits;
+    waits.notify_all();
+  };
+  Board board(hold.at(simulated.url()), options);
+  board.wait_active();
+  hold.begin();
+  ASSERT_TRUE(hold.wait_until_held());
+  const int before = waits;
+  auto armed = std::async(std::launch::async, [&] { board.arm(2s); });
+  waits.wait(before);  // then the call is in the queue of the loop
+  slept_seconds += 3;
+  hold.release();
+  EXPECT_THROW(armed.get(), Error);
+  const std::vector<std::string> executed = simulated.executed();
+  EXPECT_EQ(std::count(executed.begin(), executed.end(), "R:1,On"), 0);
 }
 
 }  // namespace

@@ -22,8 +22,7 @@ Problem problem_of(Action action) {
 
 inline testing::AssertionResult contains(const std::string& text, const std::string& part) {
   if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure()
-         << "\"" << text << "\" has no \"" << part << "\" does not contain \"";
+  return testing::AssertionFailure() << "\"" << text << "\" does not contain \"" << part << "\"";
 }
 
 }  // namespace r4::test
