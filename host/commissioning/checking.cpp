@@ -162,7 +162,7 @@ void Checking::make_ready() {
     board.wait_heard();
     const LinkStatus link = board.link();
     if (link.state == HostLinkState::active) return;
-    if (link.reason == SafeReason::link && tries != most_tries) {  // the board has yet to answer
+    if (link.reason == SafeReason::link && tries != most_tries) {  // the board has not answered yet
       collect(100ms);
       continue;
     }

@@ -73,8 +73,14 @@ void require_section(Checking& c) {
             "the wheels were not off the ground");
 }
 
+// A check that is skipped because its thing is not connected has a note.
+bool is_skipped(const CheckResult& result) {
+  return result.status == Status::skipped && result.note.empty();
+}
+
 bool is_done(const CheckResult& result) {
-  return result.status == Status::passed || result.status == Status::found;
+  return result.status != Status::not_done && result.status != Status::unsupported &&
+         !is_skipped(result);
 }
 
 std::string differences(const Wiring& before, const Wiring& after) {
@@ -125,11 +131,6 @@ void forget_learnt(Report& report, bool full_scales) {
       return (each.what == Learnt::What::full_scale) == full_scales;
     });
   }
-}
-
-// True if the person skipped the check. A check of a thing that is not connected has a note.
-bool is_skipped(const CheckResult& result) {
-  return result.status == Status::skipped && result.note.empty();
 }
 
 // The outputs that agree with the unconfirmed plan; 0 if a check disagrees or was not done.
