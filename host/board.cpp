@@ -7,7 +7,6 @@
 #include <variant>
 
 #include "board_impl.hpp"
-#include "commands/command_help.hpp"
 #include "commands/limits.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/tables/settings.hpp"

@@ -53,7 +53,7 @@ std::shared_ptr<Board::Impl> Board::Impl::started(const CarriersMaker& make, Boa
   });
 }
 
-// Ends the loop before the callbacks: the loop does not wait, so a callback may close the board.
+// Ends the loop first. The loop does not wait for callbacks, so a callback may close the board.
 void Board::Impl::close() {
   BlockingLoop::close({&async});
   keep(nullptr);  // after the loop, so that the farewell is recorded
@@ -160,8 +160,6 @@ void Board::Impl::deliver(const CommandOrGroup& what, bool late) {
   if (group != nullptr) refused.group = static_cast<std::uint8_t>(group->size());
   callbacks.notify(refused);
 }
-
-void Board::Impl::on_end() { identity = async.identity(); }
 
 void Board::Impl::on_close() {
   for_each_queue([](States::Queue& queue) { queue.end(); });

@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -78,7 +77,7 @@ struct Board::Impl final : BlockingLoop {
   void take_name();
   void deliver(const CommandOrGroup& what, bool late);
   void take_uarts(const State& fresh);
-  void on_end() override;
+  void on_end() override { identity = async.identity(); }
   void on_close() override;
   void look_at_callbacks();
   void on_callback_end(Clock::duration busy);

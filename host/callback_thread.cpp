@@ -66,13 +66,7 @@ void CallbackThread::run() {
   std::function<void()> task;
   while (take(notice, task)) {
     // noexcept: an exception from a callback ends the program where it is thrown.
-    [&]() noexcept {
-      if (task) {
-        task();
-      } else {
-        call(notice);
-      }
-    }();
+    [&]() noexcept { task ? task() : call(notice); }();
     task = nullptr;
     Clock::duration busy;
     {
@@ -113,13 +107,6 @@ void CallbackThread::call(const Notice& notice) {
   std::visit(report, notice);
 }
 
-void CallbackThread::call_first(Subscribers<ReceivedState>::One& one) {
-  if (state_.any()) one(state_);
-}
-void CallbackThread::call_first(Subscribers<CarrierEvent>::One& one) {
-  if (event_) one(*event_);
-  if (warning_ && !ended_) one(*warning_);
-}
 void CallbackThread::keep(const CarrierEvent& event) {
   const bool is_warning = event.kind == CarrierEvent::Kind::warning;
   if (!is_warning) warning_.reset();

@@ -107,9 +107,14 @@ class CallbackThread {
       if (!ended_) one(news);
     });
   }
-  void call_first(Subscribers<ReceivedState>::One& one);
+  void call_first(Subscribers<ReceivedState>::One& one) {
+    if (state_.any()) one(state_);
+  }
   void call_first(Subscribers<LinkStatus>::One& one) { one(link_); }
-  void call_first(Subscribers<CarrierEvent>::One& one);
+  void call_first(Subscribers<CarrierEvent>::One& one) {
+    if (event_) one(*event_);
+    if (warning_ && !ended_) one(*warning_);
+  }
   void call_first(Subscribers<DisarmCause>::One& one) { one(arming_); }
   void call_first(Subscriber&) {}
   void keep(const Restart&) { state_ = ReceivedState(); }

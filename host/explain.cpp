@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include "commands/command_help.hpp"
-#include "explain_safe.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/link.hpp"
 #include "session/session.hpp"
@@ -11,113 +10,152 @@ namespace r4 {
 
 namespace {
 
+struct Words {
+  std::string reason;
+  std::string fix;
+};
+
 struct CauseWords {
   const char* name;
   const char* reason;
   const char* fix;
 };
 
+constexpr CauseWords link_rows[] = {
+    {"transport down", "the transport is down: unplugged, or its interface is switched off",
+     "plug it in or switch it on; it is then opened again automatically"},
+    {"two boards", "the paths lead to two boards", "give the URLs of one board"},
+    {"watchdog", "the application watchdog has stopped our heartbeats and commands",
+     "call feed() at least once in the watchdog's period; give each call that waits a timeout "
+     "below that period"},
+    {"callback", "a callback does not return, so our heartbeats and commands have stopped",
+     "do the work of the callback in another thread; BoardOptions::callback_limit is its time "
+     "limit"},
+    {"foreign frames",
+     "the board's command id (0x180 + node) carries frames that are not R4 datagrams: another "
+     "protocol, such as CANopen, uses the id",
+     "find the ids in use with r4 bus can://INTERFACE; give the board a node whose ids are free, "
+     "or give the other device another id"},
+    {"busy", "another host controls the board",
+     "end the other host; control becomes free when its heartbeats have stopped for the board's "
+     "timeout (1 s)"},
+    {"board has no key",
+     "the board has no key and obeys every host; a program with a key does not control it",
+     "give the board this program's key over USB (r4 key give FILE URL), or open the board "
+     "without a key"},
+    {"key needed", "the board obeys only hosts that have its key",
+     "open the board with the key: --key FILE or R4_KEY of r4, SessionOptions::key in a program"},
+    {"key not taken",
+     "the board does not accept datagrams that are signed with our key, or does not receive them",
+     "check that both have the same key (r4 key give FILE URL, over USB), and that a round trip "
+     "takes less than 250 ms"},
+    {"watchers full", "the board has reached its limit of watchers",
+     "end one of these programs; its place is free two seconds later"},
+    {"not watchable", "the board's firmware streams only to the host that controls the board",
+     "update the firmware, or take control: r4 monitor --control, BoardRole::control"},
+    {"late frames",
+     "flow control of the board does not come within 20 ms: the bus, a tunnel or an adapter "
+     "delays or loses frames",
+     "use the bus without the slow part, because ISO-TP needs each frame within 10 ms; `r4 bench` "
+     "measures the round trip"},
+    {"other board", "a path leads to another board and is not used", "give the URLs of one board"},
+};
+static_assert(std::size(link_rows) == static_cast<std::size_t>(LinkCause::other_board) + 1);
+
 CauseWords words_of(LinkCause cause) {
-  switch (cause) {
-    case LinkCause::transport_down:
-      return {"transport down",
-              "the transport is down: unplugged, or its interface is switched off",
-              "plug it in or switch it on; it is then opened again automatically"};
-    case LinkCause::two_boards:
-      return {"two boards", "the paths lead to two boards", "give the URLs of one board"};
-    case LinkCause::watchdog:
-      return {"watchdog", "the application watchdog has stopped our heartbeats and commands",
-              "call feed() at least once in the watchdog's period; give each call that waits a "
-              "timeout below that period"};
-    case LinkCause::callback:
-      return {"callback", "a callback does not return, so our heartbeats and commands have stopped",
-              "do the work of the callback in another thread; BoardOptions::callback_limit is its "
-              "time limit"};
-    case LinkCause::foreign_frames:
-      return {"foreign frames",
-              "the board's command id (0x180 + node) carries frames that are not R4 datagrams: "
-              "another protocol, such as CANopen, uses the id",
-              "find the ids in use with r4 bus can://INTERFACE; give the board a node whose ids "
-              "are free, or give the other device another id"};
-    case LinkCause::busy:
-      return {"busy", "another host controls the board",
-              "end the other host; control becomes free when its heartbeats have stopped for the "
-              "board's timeout (1 s)"};
-    case LinkCause::board_has_no_key:
-      return {"board has no key",
-              "the board has no key and obeys every host; a program with a key does not control it",
-              "give the board this program's key over USB (r4 key give FILE URL), or open the "
-              "board without a key"};
-    case LinkCause::key_needed:
-      return {"key needed", "the board obeys only hosts that have its key",
-              "open the board with the key: --key FILE or R4_KEY of r4, SessionOptions::key in a "
-              "program"};
-    case LinkCause::key_not_taken:
-      return {"key not taken",
-              "the board does not accept datagrams that are signed with our key, or does not "
-              "receive them",
-              "check that both have the same key (r4 key give FILE URL, over USB), and that a "
-              "round trip takes less than 250 ms"};
-    case LinkCause::watchers_full:
-      return {"watchers full", "the board has reached its limit of watchers",
-              "end one of these programs; its place is free two seconds later"};
-    case LinkCause::not_watchable:
-      return {"not watchable",
-              "the board's firmware streams only to the host that controls the board",
-              "update the firmware, or take control: r4 monitor --control, BoardRole::control"};
-    case LinkCause::late_frames:
-      return {"late frames",
-              "flow control of the board does not come within 20 ms: the bus, a tunnel or an "
-              "adapter delays or loses frames",
-              "use the bus without the slow part, because ISO-TP needs each frame within 10 ms; "
-              "`r4 bench` measures the round trip"};
-    case LinkCause::other_board:
-      return {"other board", "a path leads to another board and is not used",
-              "give the URLs of one board"};
-  }
-  return {"", "", ""};
+  const auto row = static_cast<std::size_t>(cause);
+  return row < std::size(link_rows) ? link_rows[row] : CauseWords{"", "", ""};
 }
 
 constexpr const char* clear_on_purpose =
     "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), ";
 
 // Why outputs are off, and the action before arm().
+constexpr CauseWords disarm_rows[] = {
+    {"none", "", ""},
+    {"not yet", "a session begins disarmed", ""},
+    {"stop", "an emergency stop came", "when the danger is over, "},
+    {"handle", "the dead-man's handle was released", "hold the handle, "},
+    {"proximity", "an obstacle is nearer than a proximity threshold", "clear the way, "},
+    {"watchdog", "a task of the board's firmware missed its deadline", "find out why, "},
+    {"fault", "the board found a fault in itself", "check its chips and wiring, "},
+    {"link", "the link was lost, and the board did not restore its outputs", ""},
+    {"restart", "the board has restarted", "set its thresholds (U) again, "},
+    {"supply", "relay 1, the motor supply, was opened", ""},
+    {"sleep", "this computer slept", ""},
+    {"earlier stop", "an emergency stop came before this program began", clear_on_purpose},
+    {"earlier watchdog",
+     "a task of the board's firmware missed its deadline before this program began",
+     clear_on_purpose},
+    {"earlier fault", "the board found a fault in itself before this program controlled it",
+     clear_on_purpose},
+};
+static_assert(std::size(disarm_rows) == static_cast<std::size_t>(DisarmCause::earlier_fault) + 1);
+
 CauseWords words_of(DisarmCause cause) {
-  switch (cause) {
-    case DisarmCause::none:
-      return {"none", "", ""};
-    case DisarmCause::not_yet:
-      return {"not yet", "a session begins disarmed", ""};
-    case DisarmCause::stop:
-      return {"stop", "an emergency stop came", "when the danger is over, "};
-    case DisarmCause::handle:
-      return {"handle", "the dead-man's handle was released", "hold the handle, "};
-    case DisarmCause::proximity:
-      return {"proximity", "an obstacle is nearer than a proximity threshold", "clear the way, "};
-    case DisarmCause::watchdog:
-      return {"watchdog", "a task of the board's firmware missed its deadline", "find out why, "};
-    case DisarmCause::fault:
-      return {"fault", "the board found a fault in itself", "check its chips and wiring, "};
-    case DisarmCause::link:
-      return {"link", "the link was lost, and the board did not restore its outputs", ""};
-    case DisarmCause::restart:
-      return {"restart", "the board has restarted", "set its thresholds (U) again, "};
-    case DisarmCause::supply:
-      return {"supply", "relay 1, the motor supply, was opened", ""};
-    case DisarmCause::sleep:
-      return {"sleep", "this computer slept", ""};
-    case DisarmCause::earlier_stop:
-      return {"earlier stop", "an emergency stop came before this program began", clear_on_purpose};
-    case DisarmCause::earlier_watchdog:
-      return {"earlier watchdog",
-              "a task of the board's firmware missed its deadline before this program began",
-              clear_on_purpose};
-    case DisarmCause::earlier_fault:
-      return {"earlier fault",
-              "the board found a fault in itself before this program controlled it",
-              clear_on_purpose};
+  const auto row = static_cast<std::size_t>(cause);
+  return row < std::size(disarm_rows) ? disarm_rows[row] : CauseWords{"unknown", "", ""};
+}
+
+Words wiring_words(ChipTrouble trouble) {
+  switch (trouble) {
+    case ChipTrouble::not_confirmed:
+      return {"the board is safe: its wiring is not confirmed",
+              "compare the plan with the board's schematic (r4 wiring show serial:auto), then "
+              "confirm it: r4 wiring confirm serial:auto; or send E:CLEAR after each start"};
+    case ChipTrouble::other_bus:
+      return {
+          "the board is safe: its chips do not answer on the I2C bus of its wiring, but on the "
+          "other bus",
+          "correct 'chip bus' in the wiring file: r4 wiring give FILE serial:auto, then restart "
+          "the board"};
+    default:
+      return {"the board is safe: its stored wiring is damaged, so no signal is connected",
+              "give the wiring again: r4 wiring give FILE serial:auto, then restart the board"};
   }
-  return {"unknown", "", ""};
+}
+
+// True if a fault of the wiring, not of a chip, keeps the board safe.
+bool is_of_wiring(const LinkStatus& link) {
+  return link.reason == SafeReason::fault && link.chip.any() && link.chip.address == 0;
+}
+
+// Why a board is safe, and how the safe state ends.
+Words safe_words(const LinkStatus& link) {
+  switch (link.reason) {
+    case SafeReason::link:
+      return {"the board is safe: it does not hear our heartbeats",
+              "check the path from this computer to the board (firewall, cable); the link then "
+              "comes back automatically"};
+    case SafeReason::stop:
+      return {"the board is safe: an emergency stop is latched",
+              "send E:CLEAR when the danger is over"};
+    case SafeReason::handle:
+      return {"the board is safe: the dead-man's handle is released", "hold the handle"};
+    case SafeReason::proximity:
+      return {
+          "the board is safe: an obstacle is nearer than a proximity threshold, or a sensor does "
+          "not answer",
+          "check US1 to US4 of the state (F:DEFAULT,US1,US2,US3,US4), clear the way, or change the "
+          "threshold with U:cm,ch (0 turns it off)"};
+    case SafeReason::watchdog:
+      return {"the board is safe: a task of its firmware missed its deadline",
+              "find the cause, then send E:CLEAR or restart the board"};
+    case SafeReason::fault:
+      if (is_of_wiring(link)) return wiring_words(link.chip.trouble);
+      if (link.chip.any()) {
+        return {fmt::format("the board is safe: {}: {}", chip_name(link.chip.address),
+                            to_text(link.chip.trouble)),
+                "check that chip's supply and wiring, then send E:CLEAR"};
+      }
+      return {"the board is safe: it found a fault in itself",
+              "check the board's chips and wiring, then send E:CLEAR or restart the board"};
+    case SafeReason::none:
+      break;
+  }
+  return {
+      "the board is safe",
+      "find the reason in the board's SAFE field; E:CLEAR clears a stop, a fault and a watchdog"};
 }
 
 // Reported only without another cause, because an unused path does not disturb the other paths.
@@ -194,8 +232,7 @@ Words refusal_words(const Command* command, Refusal code, const LinkStatus& link
     case Refusal::stale:
       return {reason, is(CommandKind::clear, command)
                           ? "check the robot, because a stop or fault may have come since; then "
-                            "send the command "
-                            "again"
+                            "send the command again"
                           : "send the command again if you still need it"};
     case Refusal::auth:
       return {reason, is(CommandKind::setting, command) && is_site_setting(command->text)

@@ -3,12 +3,13 @@
 #include "standard_registry.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <system_error>
 
 #include "../firmware/ports/sim/sim_carrier.hpp"
+#include "../transports/can/can_carrier.hpp"
 #include "../transports/impaired/impaired_carrier.hpp"
+#include "../transports/udp/udp_carrier.hpp"
 #include "../transports/udp/udp_url.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/discovery/url_pattern.hpp"
@@ -39,28 +40,16 @@ Registry with_all() {
   return registry;
 }
 
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 // Equal for URLs whose texts name the same path.
 std::string path_of(const std::string& text) {
   Url url = Url::parse(text);
   url.take("share");
-  const auto value = [&url](std::string_view key, std::string_view otherwise) {
-    return "|" + url.get(key).value_or(std::string(otherwise));
-  };
-  if (url.scheme() == "udp") {
-    const UdpUrl udp(url, Role::host);
-    return "udp|" + lower(udp.host) + "|" + udp.called + "|" + std::to_string(udp.port) + "|" +
-           std::to_string(udp.listen) + "|" + udp.local.to_string();
-  }
-  if (url.scheme() == "can") return "can|" + url.host() + value("node", "1");
+  if (url.scheme() == "udp") return udp_share_name(url).text;
+  if (url.scheme() == "can") return can_share_name(url).text;
   std::error_code failed;
   const std::filesystem::path device = std::filesystem::weakly_canonical(url.path(), failed);
   const std::string path = failed || !url.path().starts_with('/') ? url.path() : device.string();
-  return url.scheme() + "|" + url.host() + "|" + path + value("sn", "");
+  return url.scheme() + "|" + url.host() + "|" + path + "|" + url.get("sn").value_or("");
 }
 
 }  // namespace

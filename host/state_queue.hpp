@@ -51,10 +51,8 @@ class States::Queue {
     news_.notify_one();
   }
   void end() {
-    {
-      const std::lock_guard lock(mutex_);
-      ended_ = true;
-    }
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
     news_.notify_all();
   }
 

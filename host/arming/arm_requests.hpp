@@ -20,7 +20,6 @@
 
 #include "../link/effects.hpp"
 #include "../link/heard_board.hpp"
-#include "../measurement/time.hpp"
 #include "arming.hpp"
 #include "r4link/command.hpp"
 #include "r4link/link.hpp"

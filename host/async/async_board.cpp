@@ -169,7 +169,7 @@ void AsyncBoard::start_release_control(Duration timeout, CompletionPtr completio
       CompletionPtr(new Impl::Steps(impl, std::move(completion), next)),
       [&] {
         impl.cancel_waits();
-        return impl.session.release_control(bounded(timeout), impl.now);
+        return impl.session.leave(bounded(timeout), impl.now, Outcome::cancelled);
       },
       0, Outcome::none);
 }

@@ -85,27 +85,19 @@ void AsyncBoard::Impl::on_sleep() {
   poll_wanted = true;
 }
 
-bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
-  switch (condition.what) {
-    case Waits::For::active:
-      return is_ready(session.board_role(), session.link());
-    case Waits::For::answer:
-      // With a pnum of 0, the state has no answer.
-      return condition.pnum != 0 && session.state().i2c_answer.pnum == condition.pnum;
-    case Waits::For::time:
-      return now >= condition.deadline;
-  }
-  return false;
-}
-
 bool AsyncBoard::Impl::end_waits() {
+  // With a pnum of 0, the state has no answer.
+  const std::uint32_t answered = session.state().i2c_answer.pnum;
   return waits.end_conditions(
-      [this](const Waits::Condition& each) -> std::optional<Outcome> {
+      [&](const Waits::Condition& each) -> std::optional<Outcome> {
         if (!is_open()) return Outcome::closed;
-        if (has_come(each)) return Outcome::confirmed;
-        const bool hopeless = each.what == Waits::For::active && session.link().cannot_begin();
-        if (hopeless) return Outcome::refused;
-        return now >= each.deadline ? std::optional(Outcome::timed_out) : std::nullopt;
+        const bool for_link = each.what == Waits::For::active;
+        const bool has_come = for_link ? is_ready(session.board_role(), session.link())
+                                       : each.pnum != 0 && each.pnum == answered;
+        if (has_come) return Outcome::confirmed;
+        if (for_link && session.link().cannot_begin()) return Outcome::refused;
+        if (now < each.deadline) return std::nullopt;
+        return each.what == Waits::For::time ? Outcome::confirmed : Outcome::timed_out;
       },
       now);
 }

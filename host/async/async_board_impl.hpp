@@ -4,7 +4,6 @@
 // the timer. on_datagram() reports at once.
 #pragma once
 
-#include <algorithm>
 #include <asio/post.hpp>
 #include <asio/steady_timer.hpp>
 #include <atomic>
@@ -12,7 +11,6 @@
 #include <cstdint>
 #include <exception>
 #include <memory>
-#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -147,7 +145,6 @@ struct AsyncBoard::Impl final : std::enable_shared_from_this<AsyncBoard::Impl> {
     });
     return result;
   }
-  bool has_come(const Waits::Condition& condition) const;
   void cancel(Ticket id);
   void open();
   void open_path(Path& path);

@@ -48,8 +48,7 @@ class Waits {
                                     [&](const Command& each) { return each.ticket == ticket; });
     if (found == commands_.end()) return;
     ended_.push_back({result, std::move(found->completion)});
-    if (found != commands_.end() - 1) *found = std::move(commands_.back());
-    commands_.pop_back();
+    commands_.erase(found);
   }
   // Ends each condition for which `outcome_of` returns an outcome. True if a condition ended.
   template <class OutcomeOf>

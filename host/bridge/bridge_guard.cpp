@@ -48,8 +48,6 @@ Verdict BridgeGuard::judge(const Datagram& datagram, Time now) {
   return !trusted_ || (heard_ && !asks_) ? Verdict::authentic : Verdict::missing;
 }
 
-bool BridgeGuard::may_answer(Verdict verdict) { return authentication_.rejected(verdict); }
-
 BridgeGuard::Trouble BridgeGuard::trouble() const {
   if (!heard_) return Trouble::none;
   if (authentication_.required()) return asks_ ? Trouble::none : Trouble::board_has_no_key;

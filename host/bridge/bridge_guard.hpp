@@ -43,7 +43,7 @@ class BridgeGuard {
 
   Verdict judge(const Datagram& datagram, Time now);
   // Counts a verdict other than authentic. True if the datagram may be answered.
-  bool may_answer(Verdict verdict);
+  bool may_answer(Verdict verdict) { return authentication_.rejected(verdict); }
 
   Trouble trouble() const;
 

@@ -60,10 +60,6 @@ void BridgeHosts::on_busy(SessionId sid, Time now) {
   }
 }
 
-void BridgeHosts::on_board_free() {
-  for (Host& host : hosts_) host.refused_until = Time();
-}
-
 bool BridgeHosts::poll(Time now) {
   next_.clear();
   for (const Host& host : hosts_) {

@@ -46,7 +46,9 @@ class BridgeHosts {
   bool on_heartbeat(Peer from, const Datagram& heartbeat, bool judged, Time now);
   void on_busy(SessionId sid, Time now);
   // The board reports that it has no host, so it refuses no host.
-  void on_board_free();
+  void on_board_free() {
+    for (Host& host : hosts_) host.refused_until = Time();
+  }
   // True if served() has changed.
   bool poll(Time now);
 

@@ -42,7 +42,6 @@
 #include "r4link/carrier.hpp"
 #include "r4link/control/boot_clock.hpp"
 #include "r4link/datagram.hpp"
-#include "r4link/messages/datagram_writer.hpp"
 #include "waiting_time.hpp"
 
 namespace r4 {

@@ -105,7 +105,7 @@ class BusQuestion {
     listener_->survey().on_datagram(
         [this](std::uint8_t node, const Datagram& datagram) { hear(node, datagram.bytes()); });
   }
-  // Also adds boards of which only damaged datagrams were received.
+  // Also adds boards from which only damaged datagrams were received.
   void put_into(Discovery& found) {
     for (const auto& [node, question] : questions_) question->end();
     for (std::uint8_t node = 0; listener_ && node < can_nodes; ++node) {

@@ -94,15 +94,13 @@ void Fleet::Impl::listen(std::size_t board) {
 }
 
 void Fleet::Impl::notify(FleetEvent event) {
-  {
-    const std::lock_guard lock(mutex);
-    if (event.kind == FleetEvent::Kind::link) links[event.board] = event.link;
-    if (events.size() == most_events) {
-      events.pop_front();
-      ++missed_events;
-    }
-    events.push_back(std::move(event));
+  const std::lock_guard lock(mutex);
+  if (event.kind == FleetEvent::Kind::link) links[event.board] = event.link;
+  if (events.size() == most_events) {
+    events.pop_front();
+    ++missed_events;
   }
+  events.push_back(std::move(event));
   news.notify_all();
 }
 

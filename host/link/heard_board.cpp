@@ -68,11 +68,6 @@ void HeardBoard::ask(std::uint32_t pnum, Time now) {
   ++questions_of_clock_;
 }
 
-void HeardBoard::asked(std::uint32_t pnum, Time now) {
-  newest_question_ = now;
-  question_.asked(pnum, now);
-}
-
 Time HeardBoard::next_question() const {
   if (identify_interval_.count() == 0) return Time::max();
   const bool first = questions_of_clock_ < first_questions;

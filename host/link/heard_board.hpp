@@ -46,8 +46,11 @@ class HeardBoard {
   // Time::max() for never.
   Time next_question() const;
   void ask(std::uint32_t pnum, Time now);
-  // A question for the program or for a group was sent.
-  void asked(std::uint32_t pnum, Time now);
+  // A Q:ID was sent, because the program asked, or to learn whether the board executes groups.
+  void asked(std::uint32_t pnum, Time now) {
+    newest_question_ = now;
+    question_.asked(pnum, now);
+  }
 
  private:
   bool supply_closed() const { return (state_.relays & 1U << (supply_relay - 1)) != 0; }

@@ -13,10 +13,6 @@ void HostKey::on_heartbeat(const Datagram& heartbeat) {
   if (signer_) signer_->on_nonce(nonce);
 }
 
-void HostKey::on_board_time(std::uint32_t t_ms, Time now) {
-  if (signer_) signer_->on_board_time(t_ms, to_ms(now));
-}
-
 void HostKey::sign(DatagramWriter& writer, Time now) {
   if (!signer_ || !signer_->ready()) return;
   signer_->sign(writer, static_cast<std::uint64_t>((clock_start_ + now).count()), to_ms(now));

@@ -24,7 +24,9 @@ class HostKey {
   }
 
   void on_heartbeat(const Datagram& heartbeat);
-  void on_board_time(std::uint32_t t_ms, Time now);
+  void on_board_time(std::uint32_t t_ms, Time now) {
+    if (signer_) signer_->on_board_time(t_ms, to_ms(now));
+  }
   void on_host_seen(Time now) {
     in_vain_ = 0;
     host_seen_ = now;
@@ -36,7 +38,7 @@ class HostKey {
     if (host_seen_ && now - *host_seen_ < host_memory) in_vain_ = 0;
   }
   void on_heartbeat_sent() { in_vain_ += asked_for_ && in_vain_ < many ? 1 : 0; }
-  // The board has answered AUTH to a datagram that only a right signature makes acceptable.
+  // The board has answered AUTH to a datagram that it accepts only with a valid signature.
   void on_refusal(Time now) { refused_until_ = now + refusal_memory; }
 
   bool has_key() const { return signer_.has_value(); }

@@ -5,9 +5,6 @@
 #include <chrono>
 #include <utility>
 
-#include "../../protocol/messages/command_field.hpp"
-#include "../../protocol/messages/state_fields.hpp"
-
 namespace r4 {
 
 LinkKeeper::LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& key, Paths& paths,
@@ -66,8 +63,7 @@ void LinkKeeper::keep_alive(Time now) {
 }
 
 void LinkKeeper::send_lease(Time now) {
-  const bool others = options_.fields != "DEFAULT";
-  const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();
+  const Text list = options_.fields != "DEFAULT" ? Text(options_.fields) : Text();
   for (std::size_t i = 0; i < paths_.count(); ++i) {
     Lease& lease = paths_.lease(i);
     if ((paths_.speaking() & path_bit(i)) == 0 || !lease.due(now)) continue;
@@ -128,8 +124,6 @@ bool LinkKeeper::is_up() const {
          (state == HostLinkState::active ||
           (state == HostLinkState::safe && link_.reason() != SafeReason::link));
 }
-
-bool LinkKeeper::hears_board() const { return watches() ? is_heard(link_.state()) : is_up(); }
 
 // Commands wait for proof of control: the board has executed this session's F. Before that, the
 // board may not have accepted the session, and a refusal would prove nothing.

@@ -52,7 +52,7 @@ class LinkKeeper {
   // True if the board receives this host's heartbeats.
   bool is_up() const;
   // True if this host receives the board's datagrams; for a controlling host, as is_up().
-  bool hears_board() const;
+  bool hears_board() const { return watches() ? is_heard(link_.state()) : is_up(); }
   // True if commands may be sent at once: the link is up, the board has executed a command of this
   // session, and neither a callback nor the watchdog holds commands back.
   bool in_control(Time now) const;

@@ -8,7 +8,7 @@
 
 namespace r4 {
 
-// The board never echoes a host's T, so a command of a session carries none.
+// The board never echoes a host's T, so a command of a session has no T.
 void Outbox::stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
                    std::uint32_t t_ms) const {
   const bool echoes = kind == CommandKind::heartbeat || kind == CommandKind::watch;

@@ -2,7 +2,6 @@
 // Writes the datagrams of a session, and signs each datagram for every path.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 

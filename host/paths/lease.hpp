@@ -17,7 +17,6 @@
 #include <cstdint>
 #include <optional>
 
-#include "../measurement/time.hpp"
 #include "r4link/link.hpp"
 
 namespace r4 {

@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "../../protocol/datagram/wrapping.hpp"
-#include "../../protocol/messages/message.hpp"
-#include "../../protocol/messages/state_fields.hpp"
 #include "r4link/messages/packet_tracker.hpp"
+#include "r4link/state.hpp"
 
 namespace r4 {
 
@@ -58,7 +57,7 @@ class PathNews {
     std::uint32_t pnum = 0;  // of the datagram in process
     Arrival arrival = Arrival::first;
     std::uint32_t gap = 0;     // missing numbers before this datagram
-    std::uint32_t others = 0;  // datagrams first received on other paths, since this path's newest
+    std::uint32_t others = 0;  // first received on other paths, after this path's newest datagram
     std::uint32_t lost = 0;    // lost datagrams in this path's gaps
     std::uint64_t copies = 0;
   };

@@ -6,19 +6,10 @@
 namespace r4 {
 
 const char* to_text(PathState state) {
-  switch (state) {
-    case PathState::down:
-      return "down";
-    case PathState::asking:
-      return "asking";
-    case PathState::other_board:
-      return "other board";
-    case PathState::silent:
-      return "silent";
-    case PathState::carrying:
-      return "carrying";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"down", "asking", "other board", "silent", "carrying"};
+  static_assert(std::size(names) == static_cast<std::size_t>(PathState::carrying) + 1);
+  const auto index = static_cast<std::size_t>(state);
+  return index < std::size(names) ? names[index] : "unknown";
 }
 
 void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
@@ -146,10 +137,6 @@ Time Paths::next(Time now) const {
   const Time begins = first_answer_ + patience;
   if (!begun_ && known() != 0 && begins > now) next = std::min(next, begins);
   return next;
-}
-
-bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
-  return path.clock && path.clock->fits(t_ms, now, now, late_of(path));
 }
 
 bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
@@ -292,10 +279,6 @@ LinkCauses Paths::lease_causes(Time now) const {
     if (const auto cause = path.lease.cause(now)) all.set(*cause);
   }
   return all;
-}
-
-void Paths::on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now) {
-  paths_[index].busy = {now + busy_memory, t_ms};
 }
 
 bool Paths::refuses(const Path& path, Time now) const {

@@ -90,7 +90,9 @@ class Paths {
 
   // The board answered BUSY at its time `t_ms`. Without `t_ms`, a transport on CAN has received
   // frames of another host with the same ids.
-  void on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now);
+  void on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now) {
+    paths_[index].busy = {now + busy_memory, t_ms};
+  }
   // A state with the board's time `t_ms` names a command of this session, so an older BUSY is void.
   void on_own_state(std::uint32_t t_ms, Time now) { own_ = {now, t_ms}; }
   // If BUSY holds on all paths that carry: until when. Empty if a path carries without BUSY.
@@ -147,7 +149,9 @@ class Paths {
     return !path.can_ask || (path.known && (!path.questions.answered ||
                                             path.questions.unanswered >= most_unanswered));
   }
-  static bool in_clock(const Path& path, std::uint32_t t_ms, Time now);
+  static bool in_clock(const Path& path, std::uint32_t t_ms, Time now) {
+    return path.clock && path.clock->fits(t_ms, now, now, late_of(path));
+  }
   bool fits(const Path& path, std::uint32_t t_ms, Time now) const;
   bool fits_others(const Path& path, std::uint32_t t_ms, Time now) const;
   bool is_of_this_boot(const Path& path, std::uint32_t t_ms, Time now) const {

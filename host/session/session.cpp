@@ -5,8 +5,6 @@
 #include <random>
 #include <utility>
 
-#include "../../protocol/messages/command_field.hpp"
-#include "../../protocol/messages/state_fields.hpp"
 #include "../commands/command_help.hpp"
 #include "../commands/limits.hpp"
 #include "r4link/error.hpp"
@@ -215,16 +213,11 @@ bool Session::may_say_farewell() const {
   return keeper_.is_up() && !watches() && board_.may_know_leave();
 }
 
-Ticket Session::leave(Time timeout, Time now) {
-  end_all_but_stops(Outcome::closed, now);
+Ticket Session::leave(Time timeout, Time now, Outcome outcome) {
+  end_all_but_stops(outcome, now);
   arming_.begin_anew();
   keeper_.leave(now);
   return may_say_farewell() ? commands_.leave(timeout, now) : 0;
-}
-
-Ticket Session::release_control(Time timeout, Time now) {
-  end_all_but_stops(Outcome::cancelled, now);
-  return leave(timeout, now);
 }
 
 void Session::change_role(BoardRole role, Time now) {

@@ -81,11 +81,9 @@ class Session {
   // Ends heartbeats and all commands except stops, and sends the farewell: the outputs are safe at
   // once, and another host need not wait for the timeout. The board's report confirms the farewell.
   // Returns 0 without a link, or if the board lacks the farewell. After leave(), only stops are
-  // sent.
-  Ticket leave(Time timeout, Time now);
+  // sent, until change_role(). `outcome`: of the ended commands.
+  Ticket leave(Time timeout, Time now, Outcome outcome = Outcome::closed);
   bool leaving() const { return keeper_.is_leaving(); }
-  // As leave(), but the commands end as cancelled, and change_role() may follow.
-  Ticket release_control(Time timeout, Time now);
   // The session is then disarmed and has a new id. All commands under way except stops are
   // cancelled. on_transport() must follow for each path that is up.
   void change_role(BoardRole role, Time now);

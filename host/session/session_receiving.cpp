@@ -2,7 +2,6 @@
 // The datagrams of the board. Each function first decides whether the datagram counts, then updates
 // the board and the link, then the commands, and then reports.
 #include "../../protocol/link/board_link.hpp"
-#include "../../protocol/messages/state_fields.hpp"
 #include "session.hpp"
 
 namespace r4 {

@@ -8,7 +8,8 @@
 //     board.stop();                                    // makes every output safe at once
 //
 // A board with a key obeys only hosts with the same key (BoardOptions::session.key). If this object
-// is destroyed or its process hangs, the heartbeats stop and the board goes safe.
+// is destroyed or its whole process hangs, the heartbeats end and the board goes safe. If only a
+// loop of the program hangs, they continue: use watchdog().
 //
 // Errors are thrown as r4::Error with the thing, the reason and the fix. open and permission: the
 // transport cannot be opened. usage: a wrong URL or a value outside its range. refused: the board
@@ -146,8 +147,8 @@ class R4LINK_API Board {
   // answer, a link or support for the farewell, the board goes safe after its timeout.
   void release_control(Duration timeout = default_timeout);
 
-  // Waits until the board is ACTIVE and this program controls it. A watcher waits until the link is
-  // active or safe. Otherwise throws Error{refused} with the state of the link.
+  // Waits until this program controls the board and no cause of the safe state lasts. A watcher
+  // waits until the link is active or safe. Otherwise throws Error{refused} with the link's state.
   void wait_active(Duration timeout = Duration{3000});
 
   // --- commands: each returns when the board's state confirms it, or throws Error{refused}
@@ -182,7 +183,8 @@ class R4LINK_API Board {
   DisarmCause disarmed_by() const;
 
   // Makes every output safe at once, and repeats until the board confirms. The stop lasts until
-  // Command::clear(). Without a confirmation, the error advises to cut the power.
+  // Command::clear(), or arm() of the same program. Without a confirmation, the error advises to
+  // cut the power.
   void stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 

@@ -144,7 +144,7 @@ class R4LINK_API Datagram {
   };
 
   Facts facts_;
-  // The ends of names and fields, alternately: bit i of word k is byte 64 k + i of the fields. Only
+  // Bit i of word k is set if byte 64 k + i of the fields ends a name (':') or a field (';'). Only
   // the words that the fields need are written or read.
   static constexpr std::size_t words = max_datagram / 64;
   std::uint64_t ends_[words];
@@ -187,9 +187,9 @@ inline void Datagram::Iterator::load() {
 }
 
 // Checks one datagram, with or without a terminator, and on success makes `out` a view of it.
-// Otherwise `out` is unchanged.
-// `syntax` also for a PNum (32 bit) or T (64 bit) that is not a whole number in range. `syntax`
-// also for a SID that is 0 or not 16 hexadecimal digits, and for a duplicate PNum, T or SID.
+// Otherwise `out` is unchanged. Also returns `syntax` for a PNum (32 bit) or T (64 bit) that is not
+// a whole number in range, for a SID that is 0 or not 16 hexadecimal digits, and for a duplicate
+// PNum, T or SID.
 R4LINK_API ReadResult read_datagram(Text bytes, Datagram& out);
 
 }  // namespace r4

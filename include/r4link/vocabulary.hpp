@@ -106,7 +106,8 @@ struct ChipFault {
   friend bool operator!=(ChipFault a, ChipFault b) { return !(a == b); }
 };
 
-// The chip at an address (paper, Figure 3): "PCA9685 0x40 (OSMC)"; 0: "wiring"; or "unknown chip".
+// The chip at an address (paper, Figure 3): "PCA9685 0x40 (OSMC)". 0: "wiring". Any
+// other address: "unknown chip".
 R4LINK_API const char* chip_name(std::uint8_t address);
 
 // --- devices on the user's I2C bus (docs/how-to/devices.md)

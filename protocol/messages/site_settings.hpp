@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The settings of one board at its site (r4link/tables/settings.hpp; docs/reference/protocol.md,
 // section 3). Only a host on the board's own cable may change them (Port::may_configure()). In a
-// name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 a percent
-// sign, %6Fff the network "off". Node and wiring take effect at the next start, the rest at once.
+// name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 is a
+// percent sign, and %6Fff is a network named "off". Node and wiring take effect at the next start,
+// all other settings at once.
 #pragma once
 
 #include <cstddef>

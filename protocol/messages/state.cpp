@@ -85,7 +85,8 @@ Text next_value(Text& rest) {
   return value;
 }
 
-// A surplus value leaves a comma in `rest`, a missing value nothing; the parser refuses both.
+// A surplus value leaves a comma in `rest`. A missing value leaves `rest` empty. The parser refuses
+// both.
 bool parse_drive(Text rest, Drive& out) {
   return parse_into(next_value(rest), pwm_max, out.pwm) && parse_into(rest, 1, out.direction);
 }

@@ -66,9 +66,8 @@ class DrivenSession : public Session {
     return done(post_by(*this, what, now, [&] { send_all(now); }), now);
   }
   Ticket arm(Time timeout, Time now) { return done(Session::arm(timeout, now), now); }
-  Ticket leave(Time timeout, Time now) { return done(Session::leave(timeout, now), now); }
-  Ticket release_control(Time timeout, Time now) {
-    return done(Session::release_control(timeout, now), now);
+  Ticket leave(Time timeout, Time now, Outcome outcome = Outcome::closed) {
+    return done(Session::leave(timeout, now, outcome), now);
   }
   void change_role(BoardRole role, Time now) {
     Session::change_role(role, now);
@@ -76,10 +75,6 @@ class DrivenSession : public Session {
   }
   void cancel(Ticket ticket, Time now) {
     Session::cancel(ticket, now);
-    perform(now);
-  }
-  void end_all(Time now) {
-    Session::end_all(now);
     perform(now);
   }
   void watchdog(std::chrono::milliseconds period, Time now) {

@@ -38,7 +38,8 @@ class PeerTable {
     return false;
   }
 
-  // That host has control and keeps its place. `nobody`: the host lost control, and may regain it.
+  // Host `number` has control and keeps its place. `nobody`: the controlling host lost control, and
+  // may regain it.
   void hold(std::uint32_t number) {
     in_control_ = number != nobody;
     if (!in_control_) return;

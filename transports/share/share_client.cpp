@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cerrno>
-#include <utility>
 
 namespace r4 {
 namespace {

@@ -2,12 +2,9 @@
 #include "share_holder.hpp"
 
 #include <fmt/format.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <string>
 #include <utility>
 
 #include "../../protocol/messages/command_field.hpp"

@@ -12,7 +12,6 @@
 #include <string_view>
 #include <vector>
 
-#include "../file_descriptor.hpp"
 #include "../operation_slot.hpp"
 #include "../share_name.hpp"
 #include "r4link/carrier.hpp"

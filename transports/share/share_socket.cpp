@@ -38,7 +38,8 @@ Address address_of(const ShareName& share, BoardRole role) {
   return Address('\0' + name);
 }
 
-// A socket for which `use(socket, address, size)` has returned 0; none, with errno, if it failed.
+// A socket for which `use(socket, address, size)` has returned 0. If a call failed: an empty
+// descriptor, and errno is set.
 template <class Use>
 FileDescriptor local_socket(const ShareName& name, BoardRole role, Use use) {
   FileDescriptor local(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
@@ -78,9 +79,7 @@ FileDescriptor connect_to_holder(const ShareName& name, BoardRole role) {
 
 FileDescriptor accept_sharer(int holder) {
   FileDescriptor sharer(::accept4(holder, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-  if (sharer) {
-    ::setsockopt(sharer.get(), SOL_SOCKET, SO_SNDBUF, &buffer_bytes, sizeof buffer_bytes);
-  }
+  if (sharer) ::setsockopt(sharer.get(), SOL_SOCKET, SO_SNDBUF, &buffer_bytes, sizeof buffer_bytes);
   return sharer;
 }
 

@@ -75,28 +75,63 @@ class SharedCarrier final : public Carrier,
     std::optional<Problem> no_help;  // why the first holder was passed over
   };
 
-  void on_datagram(std::string_view bytes, Peer from) override;
+  void on_datagram(std::string_view bytes, Peer from) override {
+    // This program gets the datagram first, because it may be driving.
+    handler_->on_datagram(bytes, from);
+    if (state_ == State::holding) holder_.tell(Kind::received, bytes);
+  }
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }
-  void on_overheard(std::string_view bytes) override;
-  void on_oversize(std::string_view beginning) override;
+  void on_overheard(std::string_view bytes) override {
+    handler_->on_overheard(bytes);
+    if (state_ == State::holding) holder_.tell(Kind::sent, bytes);
+  }
+  void on_oversize(std::string_view beginning) override {
+    handler_->on_oversize(beginning);
+    if (state_ == State::holding) holder_.tell(Kind::oversize, beginning);
+  }
   std::vector<CarrierEvent> standing() const override;
-  void on_stop_of_another(std::string_view datagram) override;
-  void on_asked() override;
+  void on_stop_of_another(std::string_view datagram) override {
+    // The other program repeats the stop until the board obeys.
+    if (state_ != State::holding) return;
+    if (own_->send(datagram, Priority::stop, everyone) != SendResult::sent) return;
+    holder_.tell(Kind::sent, datagram);
+    handler_->on_overheard(datagram);
+  }
+  void on_asked() override {
+    if (role_ == BoardRole::watch) lose();
+  }
   void on_message(const ShareMessage& message) override;
   void on_all_heard() override { handler_->on_drained(); }
-  void on_no_help(const Problem& why) override;
-  void on_closed() override;
+  void on_no_help(const Problem& why) override {
+    if (state_ == State::joined) search_.began = Clock::now();
+    pass_over(why);
+    state_ = State::seeking;
+    look();
+  }
+  void on_closed() override {
+    if (state_ == State::joined) return lose();
+    const bool let_go = role_ == BoardRole::control;
+    state_ = State::seeking;
+    look_later(let_go ? milliseconds(0) : late() ? look_again_slowly : look_again);
+  }
 
   bool take_part();
   void require_control();
   bool hold_to_watch();
   void open_own();
   void pass_over(const Problem& why);
-  void lose();
+  void lose() {
+    seek();
+    // After seek(): the transport is free before other programs look for a holder.
+    holder_.release();
+  }
   void seek();
   void look();
-  void look_later(milliseconds delay);
+  void look_later(milliseconds delay) {
+    timer_.expires_after(delay);
+    timer_.async_wait(looking_.handler([this] { look(); }));
+  }
   bool late() const { return Clock::now() - search_.began >= take_over_within; }
   bool is_served() const {
     return state_ == State::joined || (state_ == State::asking && role_ == BoardRole::watch);
@@ -250,11 +285,6 @@ void SharedCarrier::pass_over(const Problem& why) {
   search_.no_help->thing = name_;
 }
 
-void SharedCarrier::lose() {
-  seek();
-  holder_.release();  // after seek(): the transport is free before other programs look for a holder
-}
-
 void SharedCarrier::seek() {
   client_.leave();
   own_->close();
@@ -281,11 +311,6 @@ void SharedCarrier::look() {
   look_later(late() ? look_again_slowly : look_again);
 }
 
-void SharedCarrier::look_later(milliseconds delay) {
-  timer_.expires_after(delay);
-  timer_.async_wait(looking_.handler([this] { look(); }));
-}
-
 SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer to) {
   if (state_ == State::holding) {
     const SendResult result = own_->send(bytes, priority, to);
@@ -298,22 +323,6 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
   ++shared_counters_.tx_datagrams;
   shared_counters_.tx_bytes += bytes.size();
   return client_.send_stop(bytes);
-}
-
-void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
-  // This program gets the datagram first, because it may be driving.
-  handler_->on_datagram(bytes, from);
-  if (state_ == State::holding) holder_.tell(Kind::received, bytes);
-}
-
-void SharedCarrier::on_overheard(std::string_view bytes) {
-  handler_->on_overheard(bytes);
-  if (state_ == State::holding) holder_.tell(Kind::sent, bytes);
-}
-
-void SharedCarrier::on_oversize(std::string_view beginning) {
-  handler_->on_oversize(beginning);
-  if (state_ == State::holding) holder_.tell(Kind::oversize, beginning);
 }
 
 void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
@@ -346,17 +355,6 @@ std::vector<CarrierEvent> SharedCarrier::standing() const {
   return events;
 }
 
-void SharedCarrier::on_stop_of_another(std::string_view datagram) {
-  if (state_ != State::holding) return;  // the other program repeats the stop until the board obeys
-  if (own_->send(datagram, Priority::stop, everyone) != SendResult::sent) return;
-  holder_.tell(Kind::sent, datagram);
-  handler_->on_overheard(datagram);
-}
-
-void SharedCarrier::on_asked() {
-  if (role_ == BoardRole::watch) lose();
-}
-
 void SharedCarrier::on_message(const ShareMessage& message) {
   switch (message.kind) {
     case Kind::welcome:
@@ -384,20 +382,6 @@ void SharedCarrier::on_message(const ShareMessage& message) {
     default:
       break;
   }
-}
-
-void SharedCarrier::on_no_help(const Problem& why) {
-  if (state_ == State::joined) search_.began = Clock::now();
-  pass_over(why);
-  state_ = State::seeking;
-  look();
-}
-
-void SharedCarrier::on_closed() {
-  if (state_ == State::joined) return lose();
-  const bool let_go = role_ == BoardRole::control;
-  state_ = State::seeking;
-  look_later(let_go ? milliseconds(0) : late() ? look_again_slowly : look_again);
 }
 
 }  // namespace

@@ -40,15 +40,6 @@ void UdpBoard::find_peer(const Endpoint& local) {
   audience_ = Place{host, {}};
 }
 
-void UdpBoard::close() noexcept {
-  audience_.reset();
-  UdpEnd::close();
-}
-
-void UdpBoard::listen() {
-  socket_.async_wait(UdpSocket::wait_read, reception_.handler([this] { take_what_is_there(); }));
-}
-
 void UdpBoard::take_what_is_there() {
   for (int i = 0; i < most_packets && handler_ != nullptr; ++i) {
     const auto size = receive_packet(socket_.native_handle(), received_.data(), received_.size(),
@@ -70,11 +61,6 @@ void UdpBoard::received(std::string_view bytes) {
   const Peer peer = peers_.heard({sender_, sent_to_}, bytes);
   follow_audience();
   hand_over(bytes, peer);
-}
-
-void UdpBoard::hold(Peer peer) {
-  peers_.hold(peer);
-  follow_audience();
 }
 
 bool UdpBoard::reaches(Peer peer) const {
@@ -102,10 +88,6 @@ SendResult UdpBoard::transmit(std::string_view bytes, Peer to) {
     return transmit_to(bytes, audience_->host, true, asker->at);
   }
   return outcome;
-}
-
-int UdpBoard::probe(const std::vector<OwnAddress>& own) {
-  return probe_route(audience_ ? audience_->host : Endpoint(), {}, own);
 }
 
 }  // namespace r4

@@ -18,8 +18,14 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
   ~UdpBoard() override { close(); }
 
   void open(Handler& handler) override;
-  void close() noexcept override;
-  void hold(Peer peer) override;
+  void close() noexcept override {
+    audience_.reset();
+    UdpEnd::close();
+  }
+  void hold(Peer peer) override {
+    peers_.hold(peer);
+    follow_audience();
+  }
   void also_hold(Peer peer) override { peers_.also_hold(peer); }
   bool reaches(Peer peer) const override;
 
@@ -31,11 +37,15 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
     friend bool operator==(const Place&, const Place&) = default;
   };
 
-  void listen() override;
+  void listen() override {
+    socket_.async_wait(UdpSocket::wait_read, reception_.handler([this] { take_what_is_there(); }));
+  }
   void take_what_is_there();
   void received(std::string_view bytes);
   SendResult transmit(std::string_view bytes, Peer to) override;
-  int probe(const std::vector<OwnAddress>& own) override;
+  int probe(const std::vector<OwnAddress>& own) override {
+    return probe_route(audience_ ? audience_->host : Endpoint(), {}, own);
+  }
 
   void find_peer(const Endpoint& local);
   void follow_audience();

@@ -27,7 +27,7 @@
 
 namespace r4 {
 
-// Throws Error{usage} for a wrong URL. A host that yields takes any port, if the URL has none.
+// Throws Error{usage} for a wrong URL. Without a port in the URL, a host that yields takes any.
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role,
                                           Claim claim);
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <asio/io_context.hpp>
 #include <asio/ip/udp.hpp>
-#include <cstdint>
 #include <string>
 #include <string_view>
 

@@ -44,8 +44,6 @@ void UdpHost::open(Handler& handler) {
   if (named_ || host_socket_.connected()) watch_.start(socket_.is_open());
 }
 
-void UdpHost::close_socket() noexcept { host_socket_.close(); }
-
 void UdpHost::close() noexcept {
   watch_.stop();
   network_.leave(*this);
@@ -143,7 +141,7 @@ void UdpHost::listen() {
 }
 
 void UdpHost::received(std::string_view bytes) {
-  if (!host_socket_.hears(sender_)) {
+  if (sender_ != board_) {
     ++counters_.rx_foreign;
     return;
   }

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <asio/io_context.hpp>
-#include <memory>
 
 #include "../share_name.hpp"
 #include "network/network_watch.hpp"
@@ -30,7 +29,7 @@ class UdpHost final : public UdpEnd, private NetworkWatch::Member {
   }
   int probe(const std::vector<OwnAddress>& own) override;
   void on_network_change(const std::vector<OwnAddress>& own) override { check_network(own); }
-  void close_socket() noexcept override;
+  void close_socket() noexcept override { host_socket_.close(); }
 
   void bind(const Endpoint& board);
   void found(const FoundHost& answer);

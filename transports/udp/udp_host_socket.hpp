@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The socket with which a host hears one board. The boards of a program share the port of hosts.
-// Another program cannot share this port, so a conflict is noticed. A further socket is bound to
-// the same port and connected, so the kernel gives it its board's packets, and the first socket
-// all other packets. A packet between bind and connect may be lost.
+// Another program cannot share this port, so a conflict is noticed. The first socket is only bound.
+// A socket for a further board is bound to the same port and connected to that board. So the kernel
+// gives that board's packets to the connected socket, and all other packets to the first socket. A
+// packet between bind and connect may be lost.
 #pragma once
 
 #include <asio/error_code.hpp>
-#include <asio/io_context.hpp>
 #include <asio/ip/udp.hpp>
-#include <cstdint>
 
 #include "../operation_slot.hpp"
 
@@ -33,8 +32,6 @@ class UdpHostSocket {
   bool connected() const { return connected_; }
   // If connected, lets the kernel choose again. 0, or errno.
   int reconnect();
-
-  bool hears(const Endpoint& sender) const { return sender == board_; }
 
  private:
   UdpSocket& socket_;

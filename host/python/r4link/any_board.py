@@ -88,7 +88,7 @@ class AnyBoard(ABC, Generic[Sent]):
 
     def stop(self, timeout: float = 1.0) -> Sent:
         """Makes all outputs safe at once. The stop is repeated until confirmed, and latched until
-        Command.clear()."""
+        Command.clear(), or arm() of the same program."""
         sent: Sent = self._call(lambda core: core.stop(_ms(timeout)))
         return sent
 

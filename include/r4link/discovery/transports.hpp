@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transports that a URL can name, for the help of a program.
+// The transports that a URL can name, as text for a program's --help.
 #pragma once
 
 #include <string>

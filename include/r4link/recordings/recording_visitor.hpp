@@ -38,9 +38,10 @@ class RecordingVisitor {
   virtual void on_path(const RecordedPath& path) { static_cast<void>(path); }
   // A device in a slot of a path, until the next header. Device::parse() reads the device.
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
-  // A recording begins or continues here: one file may hold several.
+  // A recording begins or continues here. One file may hold several recordings.
   virtual void on_header() {}
-  // Any # line except path lines; header and device lines follow on_header() and on_device().
+  // Any # line except path lines. A header or device line is passed too, after on_header() or
+  // on_device().
   virtual void on_comment(std::string_view line) { static_cast<void>(line); }
 };
 

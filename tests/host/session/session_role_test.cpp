@@ -44,7 +44,7 @@ TEST_F(SessionRole, TakingControlBeginsANewDisarmedSession) {
 
 TEST_F(SessionRole, ReleasingControlWatchesAfterTheConfirmedFarewell) {
   take();
-  const Ticket ticket = link.session.release_control(100ms, link.now);
+  const Ticket ticket = link.session.leave(100ms, link.now, Outcome::cancelled);
   EXPECT_TRUE(link.session.leaving());
   EXPECT_EQ(link.last('E').command, "E:LEAVE");
   link.pass(50ms);
@@ -71,7 +71,7 @@ TEST_F(SessionRole, ReleasingControlDisarmsAndTheNextControlIsANewSession) {
   const std::uint32_t of_first = link.last('R').pnum;
   link.state("SAFE:0;RELAYS:1;CMD:" + std::to_string(of_first) + ";");
   ASSERT_EQ(outcome(armed), Outcome::confirmed);
-  link.session.release_control(100ms, link.now);
+  link.session.leave(100ms, link.now, Outcome::cancelled);
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet);
   EXPECT_EQ(link.arming, (std::vector<DisarmCause>{DisarmCause::none, DisarmCause::not_yet}));
   link.heartbeat(SafeReason::link);
@@ -95,7 +95,7 @@ TEST_F(SessionRole, AChangeOfRoleCancelsEarlierCommands) {
   const Ticket early = link.session.send(Command::fields("ENC1"), 60s, link.now);
   const Ticket arms = link.session.arm(60s, link.now);
   const Ticket behind = link.session.send(turn_motor, 60s, link.now);
-  EXPECT_EQ(link.session.release_control(100ms, link.now), 0U) << "there is no link yet";
+  EXPECT_EQ(link.session.leave(100ms, link.now, Outcome::cancelled), 0U) << "there is no link yet";
   for (const Ticket each : {early, arms, behind}) EXPECT_EQ(outcome(each), Outcome::cancelled);
   const Ticket late = link.session.send(Command::fields("ENC1"), 60s, link.now);
   change(BoardRole::watch);

@@ -43,7 +43,8 @@ void BusTransfers::on_lane_frame(Interface& interface, const CanIdMeaning& meani
                                  const CanFrame& frame, const Place& place) {
   if (isotp_frame::is_flow_control(frame) && meaning.kind != CanIdKind::telemetry) {
     ++flow_control_;
-    // A receiver sends flow control on the id of its datagrams: the frame answers the other lane.
+    // A receiver sends flow control on the id of its own datagrams. So this frame answers a
+    // transfer on the other lane.
     const bool of_board = meaning.kind == CanIdKind::reply;
     lane_of(interface, {of_board ? CanIdKind::command : CanIdKind::reply, meaning.node}).answered =
         true;

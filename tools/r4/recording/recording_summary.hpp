@@ -14,7 +14,7 @@
 
 namespace r4::tool {
 
-// A board sends at least twice a second: a longer silence is a gap.
+// A board sends at least twice a second, so a silence of 1 s is a gap even if a datagram is late.
 constexpr Time shortest_gap{std::chrono::seconds{1}};
 
 struct PathSummary {

@@ -55,7 +55,8 @@ class CanNode {
   void frame_sent(std::uint32_t now_us);
   // True for a frame of this end's dialogue, which the other end answers with flow control.
   bool may_be_answered(const CanFrame& frame) const;
-  // Restarts the wait for flow control: the frames wait for the bus, or just reached the bus.
+  // Restarts the wait for flow control, because the frames still wait for the bus or have only now
+  // reached it.
   void wait_anew(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
   // Returns the datagram that the frame completes, valid until the next call; otherwise empty.
   Text on_frame(const CanFrame& frame, std::uint32_t now_us);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The first byte of a packed datagram: its layout, sizes of PNum and T (docs/reference/packed.md).
+// The first byte of a packed datagram: the layout, and the sizes of PNum and T
+// (docs/reference/packed.md).
 #pragma once
 
 #include <cstddef>

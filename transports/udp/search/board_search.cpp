@@ -48,13 +48,6 @@ FileDescriptor open_in(Network& network) {
   return socket;
 }
 
-void ask(int socket, Network& network, std::uint16_t port, const std::string& text) {
-  const Endpoint to(network.to, port);
-  const bool sent = ::sendto(socket, text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-                             to.data(), static_cast<socklen_t>(to.size())) >= 0;
-  network.trouble = sent ? "" : std::strerror(errno);
-}
-
 class Round {
  public:
   Round(const BoardSearch& search, std::string_view called) : search_(search), called_(called) {
@@ -90,7 +83,13 @@ class Round {
 
   void ask_all(const std::string& text) {
     for (std::size_t i = 0; i < sockets_.size(); ++i) {
-      if (sockets_[i]) ask(sockets_[i].get(), result_.networks[i], search_.port, text);
+      if (!sockets_[i]) continue;
+      const int socket = sockets_[i].get();
+      Network& network = result_.networks[i];
+      const Endpoint to(network.to, search_.port);
+      const bool sent = ::sendto(socket, text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+                                 to.data(), static_cast<socklen_t>(to.size())) >= 0;
+      network.trouble = sent ? "" : std::strerror(errno);
     }
   }
 
@@ -102,9 +101,7 @@ class Round {
                                       MSG_DONTWAIT | MSG_TRUNC, from.data(), &from_size);
       if (size < 0) return;
       // A board answers from the port at which it listens.
-      if (from.port() != search_.port || static_cast<std::size_t>(size) > max_datagram) {
-        continue;
-      }
+      if (from.port() != search_.port || static_cast<std::size_t>(size) > max_datagram) continue;
       std::optional<IdentityAnswer> answer =
           read_identity_answer(Text(buffer_.data(), static_cast<std::size_t>(size)));
       if (!answer) continue;

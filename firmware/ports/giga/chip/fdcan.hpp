@@ -92,7 +92,7 @@ class Fdcan {
   // Values at the last poll. If `sent` rose, the queue has moved, even if it was refilled.
   std::uint32_t pending_before_ = 0;
   std::uint32_t sent_before_ = 0;
-  std::uint32_t moved_us_ = 0;  // when a frame left last
+  std::uint32_t moved_us_ = 0;  // when a frame last left the queue
   FdcanCounters counters_;
 };
 

@@ -94,7 +94,8 @@ bool I2cController::alive(const Transfer& transfer) const {
   return transfer.recovery == recoveries_ && clock_() - transfer.began_us < transfer.limit_us;
 }
 
-// If interrupted, request() and put() do nothing: no restart, and no byte for the next transfer.
+// If another transfer has taken over the bus, request() and put() do nothing and return false: a
+// START or a byte would disturb that transfer.
 bool I2cController::request(const Transfer& transfer, std::uint32_t cr2) {
   const InterruptLock lock;
   if (transfer.recovery != recoveries_) return false;
