@@ -11,8 +11,6 @@
 #include <asio/strand.hpp>
 #include <asio/thread_pool.hpp>
 #include <asio/use_awaitable.hpp>
-#include <asio/use_future.hpp>
-#include <future>
 #include <optional>
 #include <thread>
 
@@ -146,13 +144,6 @@ TEST_F(AsyncBoardTest, GivesEverySubscriberTheNewestCause) {
   ASSERT_TRUE(run_until([&] { return armed.link().reason == SafeReason::stop; }));
   ASSERT_FALSE(told.empty());
   EXPECT_EQ(told.back(), DisarmCause::stop) << "the first board object has stopped the board";
-}
-
-TEST_F(AsyncBoardTest, ConfirmsThroughAFuture) {
-  board.open();
-  std::future<CommandResult> sent = board.async_send(start_motor, 1s, asio::use_future);
-  ASSERT_TRUE(run_until([&] { return sent.wait_for(0s) == std::future_status::ready; }));
-  EXPECT_EQ(sent.get().outcome, Outcome::confirmed);
 }
 
 TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {

@@ -26,12 +26,13 @@ using firmware::BoardState;
 
 // --- every transport
 
-class BoardOver : public testing::TestWithParam<const char*> {};
+struct BoardOver : testing::TestWithParam<const char*> {
+  BoardInAThread simulated{GetParam()};
+};
 INSTANTIATE_TEST_SUITE_P(Transports, BoardOver, testing::Values("udp", "pty"),
                          [](const auto& transport) { return std::string(transport.param); });
 
 TEST_P(BoardOver, ConfirmsEveryCommandAfterItsExecution) {
-  BoardInAThread simulated(GetParam());
   Board board(simulated.url(), at_will());
   board.wait_active();
   board.setting("rate", "1000");
@@ -87,7 +88,6 @@ TEST(BoardAtACable, KeepsAWiringForItsNextStart) {
 }
 
 TEST_P(BoardOver, StopsUntilCleared) {
-  BoardInAThread simulated(GetParam());
   Board board(simulated.url(), at_will());
   board.wait_active();
   board.osmc(1).set_pwm(1000, Direction::forward);
@@ -112,7 +112,6 @@ TEST_P(BoardOver, StopsUntilCleared) {
 }
 
 TEST_P(BoardOver, TheBoardGoesSafeWhenTheApplicationHangs) {
-  BoardInAThread simulated(GetParam());
   Board board(simulated.url(), at_will());
   board.setting("heartbeat", "50");
   board.setting("timeout", "150");
@@ -131,7 +130,6 @@ TEST_P(BoardOver, TheBoardGoesSafeWhenTheApplicationHangs) {
 }
 
 TEST_P(BoardOver, TheBoardIsSafeAndFreeWhenTheHostHasEnded) {
-  BoardInAThread simulated(GetParam());
   for (int i = 0; i < 3; ++i) {
     Board board(simulated.url(), at_will());
     board.setting("timeout", "10000");  // much longer than any wait below
@@ -157,17 +155,6 @@ TEST(Board, ReportsARestartBeforeTheNewState) {
   board.fields("OSMC1");
   board.osmc(1).set_pwm(358, Direction::forward);
   EXPECT_EQ(four.get(), (std::vector<int>{0, 358, -1, 0}));
-}
-
-TEST(Board, ReportsAnInvalidUrl) {
-  const Problem scheme = problem_of([] { Board("fax:123"); });
-  EXPECT_EQ(scheme.kind, ErrorKind::usage);
-  EXPECT_TRUE(contains(scheme.fix, "udp://HOST"));
-  EXPECT_TRUE(contains(scheme.fix, "sim:"));
-  EXPECT_EQ(problem_of([] { Board(""); }).kind, ErrorKind::usage);
-  EXPECT_EQ(problem_of([] { Board("udp://127.0.0.1?color=red"); }).kind, ErrorKind::usage);
-  EXPECT_EQ(problem_of([] { Board("serial:///dev/there-is-no-such-port"); }).kind, ErrorKind::open);
-  EXPECT_EQ(problem_of([] { Board("sim:?node=99"); }).kind, ErrorKind::usage);
 }
 
 TEST(Board, ErrorsNameTheReasonOfAnInactiveLink) {
@@ -251,27 +238,7 @@ TEST_F(DrivenBoard, StopsWithoutWaiting) {
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
 }
 
-TEST(Board, MeasuresTheLink) {
-  Board board("sim:", at_will());
-  board.wait_active();
-  board.identify();
-  for (int i = 0; i < 20; ++i) board.next_state();
-  const Statistics statistics = board.statistics();
-  EXPECT_GE(statistics.states, 20U);
-  EXPECT_EQ(statistics.packets.lost, 0U);
-  EXPECT_EQ(statistics.packets.duplicate, 0U);
-  EXPECT_GT(statistics.round_trip_us, 0);
-  EXPECT_GT(statistics.state_rate_hz, 50);
-  EXPECT_LT(statistics.state_rate_hz, 150);
-  EXPECT_EQ(statistics.loss(), 0);
-  board.close();
-  EXPECT_GE(board.statistics().states, statistics.states)
-      << "the statistics stay available after close()";
-}
-
-TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
+TEST_F(DrivenBoard, TakesCommandsFromSeveralThreadsAtOnce) {
   board.setting("rate", "1000");
   std::atomic<int> confirmed{0};
   std::vector<std::thread> threads;
@@ -363,6 +330,7 @@ TEST(Board, MayBeClosedTwiceAndRefusesLaterCalls) {
   board.feed();
   board.stop_async();
   EXPECT_NE(board.state().t_ms, 0U) << "the last state stays available";
+  EXPECT_NE(board.statistics().states, 0U) << "the statistics stay available";
 }
 
 TEST(Board, CloseEndsAllWaitingCalls) {

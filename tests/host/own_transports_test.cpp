@@ -28,6 +28,7 @@
 #include "r4link/transports/own_transport.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/first.hpp"
+#include "tests/support/problems.hpp"
 #include "transports/file_descriptor.hpp"
 #include "transports/own/own_carriers.hpp"
 
@@ -220,13 +221,9 @@ TEST(OwnTransports, CarryCommandsAndStopsToABoard) {
 TEST(OwnTransports, AnErrorOfTheFirstOpenIsThrownByTheBoardConstructor) {
   const auto modem = std::make_shared<Modem>();
   modem->opens = true;
-  try {
-    const Board board(carrier_on(modem));
-    ADD_FAILURE() << "the transport opened, although it must fail";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.problem().thing, "modem");
-    EXPECT_EQ(error.problem().reason, "no modem");
-  }
+  const Problem problem = problem_of([&] { const Board board(carrier_on(modem)); });
+  EXPECT_EQ(problem.thing, "modem");
+  EXPECT_EQ(problem.reason, "no modem");
   EXPECT_EQ(modem->closings, 0);
 }
 

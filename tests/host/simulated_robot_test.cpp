@@ -8,7 +8,6 @@
 #include "r4link/board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/simulation.hpp"
-#include "tests/support/at_will.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4 {
@@ -129,30 +128,6 @@ TEST(SimulatedRobot, ReportsInvalidEventsAndUrls) {
   }
   EXPECT_TRUE(test::contains(test::problem_of([&] { const Board none(gone); }).text(),
                              "no such SimulatedRobot"));
-}
-
-TEST(BadLink, LosesDuplicatesAndDamagesDatagramsOfAnyBoard) {
-  sim::SimulatedRobot robot;
-  Board board(sim::with_link(robot.url(), "loss=20%,duplicate=20%,corrupt=10%,seed=3"),
-              test::at_will());
-  board.wait_active(std::chrono::seconds{10});
-  for (int i = 0; i < 50; ++i) board.next_state();
-  const Statistics statistics = board.statistics();
-  EXPECT_GT(statistics.packets.lost, 3U);
-  EXPECT_GT(statistics.packets.duplicate, 3U);
-  EXPECT_GT(statistics.damaged, 1U);
-  // The library repeats the command until it is confirmed. If all duplicates arrived too late, the
-  // test sends the command again, as the error advises.
-  for (Refusal refusal = Refusal::stale; refusal == Refusal::stale;) {
-    try {
-      board.osmc(1).set_pwm(358, Direction::forward, std::chrono::seconds{10});
-      refusal = Refusal::none;
-    } catch (const Error& error) {
-      refusal = error.refusal();
-      EXPECT_EQ(refusal, Refusal::stale) << error.what();
-    }
-  }
-  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 358);
 }
 
 TEST(BadLink, RefusesInvalidImpairments) {

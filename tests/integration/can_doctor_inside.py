@@ -7,7 +7,7 @@ import pytest
 
 from r4_process import Board, objects, run
 
-WARNINGS, REFUSED, OPEN, UNSUPPORTED = 1, 3, 4, 6
+REFUSED, OPEN, UNSUPPORTED = 3, 4, 6
 
 
 def ip(*arguments):

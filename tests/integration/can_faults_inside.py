@@ -15,18 +15,17 @@ import pytest
 
 from can_inside import PATIENTLY, SLOWLY, Dump, in_control
 from r4_process import PATIENCE_S, Board, Running, driving, is_link, is_state, lasts, monitor, objects, run, send
-from slcan_bus import SlcanBus
+from slcan_bus import BITRATE, SlcanBus
 
-BITRATE = 500000
 BOARD, HOST = 'can://slcan0?node=1', 'can://slcan1?node=1'
-STOP, COMMAND, TELEMETRY, FLOOD, BABBLE = 0x010, 0x181, 0x401, 0x7FF, 0x001
+STOP, COMMAND, TELEMETRY, FLOOD = 0x010, 0x181, 0x401, 0x7FF
 OF_HOST = (STOP, COMMAND, FLOOD)
 DRIVING, OFF = [358, 1], [0, 0]
 
 
 @pytest.fixture(name='bus')
 def running_bus():
-    with SlcanBus(2, BITRATE) as bus:
+    with SlcanBus() as bus:
         yield bus
 
 
@@ -51,19 +50,6 @@ def told(reason):
 
 def board_told(reason):
     return lambda each: reason in each.get('transport', {}).get('reason', '')
-
-
-def goes_safe(board):
-    board.outputs(lambda outputs: outputs['osmc'][0] == OFF)
-    safe = board.state('SAFE', 'link')
-    print(f'silence to safe {safe["silence"]} ms')
-    return safe
-
-
-def drives_again(board, since):
-    """Asserts that the session resumes by itself, with the outputs that the session commanded earlier."""
-    back = board.outputs(lambda outputs: outputs['osmc'][0] == DRIVING)
-    print(f'drives again after {(back["came"] - since) * 1000:.0f} ms')
 
 
 def streams_again(host, since):
@@ -114,30 +100,20 @@ def test_a_host_reports_a_controller_that_is_already_bus_off(bus):
     assert 'ip link set slcan1' in down['fields']['fix'], down
 
 
-def test_a_board_reports_bus_off_goes_safe_and_recovers(bus, board):
-    with driving_host(board):
+def test_a_board_reports_bus_off_goes_safe_at_once_and_recovers(bus):
+    with Board(BOARD, options=PATIENTLY) as board, driving_host(board):
         bus.order('spoil', 0)
         off = bus.state(0, 'bus-off')
         down = board.next(board_told('bus-off'))
         assert down['transport']['event'] == 'down' and 'ip link set slcan0' in down['transport']['fix']
         print(f'told {(down["came"] - off["came"]) * 1000:.1f} ms after it')
-        goes_safe(board)
+        board.outputs(lambda outputs: outputs['osmc'][0] == OFF)
+        assert board.state('SAFE', 'link')['silence'] < 5000, 'the safe state came only with the timeout'
         bus.order('heal', 0)
         since = time.monotonic()
         bus.reset(0)
-        drives_again(board, since)
-
-
-def test_the_board_goes_safe_when_the_hosts_controller_is_bus_off(bus, board):
-    with driving_host(board):
-        bus.order('spoil', 1)
-        off = bus.state(1, 'bus-off')
-        safe = goes_safe(board)
-        print(f'safe {(safe["came"] - off["came"]) * 1000:.0f} ms after bus-off')
-        bus.order('heal', 1)
-        since = time.monotonic()
-        bus.reset(1)
-        drives_again(board, since)
+        back = board.outputs(lambda outputs: outputs['osmc'][0] == DRIVING)
+        print(f'drives again after {(back["came"] - since) * 1000:.0f} ms')
 
 
 def test_a_host_reports_its_bus_off_and_recovers_by_itself(bus, board):
@@ -183,43 +159,8 @@ def test_a_host_alone_on_the_bus_reports_missing_acknowledgements(bus, board):
         assert bus.status()['nodes'][1]['state'] != 'b'
 
 
-def test_the_bus_repeats_damaged_frames_of_a_datagram(bus):
-    with Board(BOARD):
-        with monitor(HOST, '--duration', '30') as host:
-            in_control(host)
-            before = bus.status()
-            bus.order('noise', 0.05)
-            for _ in range(100):
-                host.next(is_state)
-            status = bus.status()
-            bus.order('noise', 0)
-            log = host.rest()
-        result = send(HOST, *(f'S:{1000 + i},{1 + i % 16}' for i in range(5)))
-    assert result.returncode == 0, result
-    failed, frames = (status[each] - before[each] for each in ('failed', 'frames'))
-    transfers = next(each['fields'] for each in log if each['type'] == 'transfers')
-    print(f'{failed} of {frames} frames damaged, {transfers}')
-    assert frames >= 500 and failed >= 5  # the numbers are random, and five times as many are likely
-    assert transfers['packed'] >= 100
-    # timed_out and interrupted are not asserted: an end in the guest may pause for longer than N_Bs (20 ms). Then the
-    # other end abandons its transfer and begins the next, with or without noise.
-    lost = ('wrong_sequence', 'overflow', 'malformed', 'bad_form', 'dropped_frames')
-    assert sum(transfers[each] for each in lost) <= failed / 4, transfers
-
-
-def test_a_babbling_node_of_top_priority_leaves_the_board_safe():
-    with SlcanBus(2, 250000) as bus, Board(BOARD) as board, driving_host(board):
-        bus.order('babble', f'{BABBLE:x}')
-        since = time.monotonic()
-        safe = goes_safe(board)
-        print(f'safe {(safe["came"] - since) * 1000:.0f} ms after the babbling began')
-        bus.order('quiet')
-        since = time.monotonic()
-        drives_again(board, since)
-
-
 def test_a_full_queue_drops_old_states_but_damages_no_datagram():
-    with SlcanBus(2, BITRATE, txqueuelen=10) as bus, Board(BOARD) as board, monitor(HOST) as host:
+    with SlcanBus(txqueuelen=10) as bus, Board(BOARD) as board, monitor(HOST) as host:
         in_control(host)
         # Another program keeps the queue of the board's interface full.
         flood = subprocess.Popen(['cangen', 'slcan0', '-g', '0', '-i', '-I', f'{FLOOD:X}', '-L', '8'])
@@ -259,7 +200,7 @@ def wait_for_sockets(interface, identifier, count):
 
 
 def test_a_stop_overtakes_a_full_queue():
-    with SlcanBus(2, BITRATE, txqueuelen=10) as bus, Board(BOARD) as board, Dump('slcan0') as dump:
+    with SlcanBus(txqueuelen=10) as bus, Board(BOARD) as board, Dump('slcan0') as dump:
         with driving_host(board):
             bus.order('stall', 1)
             flood = subprocess.Popen(['cangen', 'slcan1', '-g', '0', '-i', '-I', f'{FLOOD:X}', '-L', '8'])

@@ -283,10 +283,10 @@ class Host(Peer):
 class Board(Peer):
     """The parts of a board for r4: the link, F, O, Q, E:STOP, E:CLEAR. As a context, the board runs in a thread."""
 
-    def __init__(self, interface, node, fd=False, packs=True, obeys=True, refuses=()):
+    def __init__(self, interface, node, fd=False, packs=True, refuses=()):
         super().__init__(interface, REPLIES + node, TO_BOARD + node, [EMERGENCY_STOP, TO_BOARD + node], fd)
         self.receivers = {TO_BOARD + node: Receiver(lambda data: self.send_frame(self.own_id, data))}
-        self.node, self.packs, self.obeys, self.refuses = node, packs, obeys, refuses
+        self.node, self.packs, self.refuses = node, packs, refuses
         self.host_packs = False  # true if the newest datagram of the host was packed
         self.offset = random.randrange(2 ** 31)
         self.began = time.monotonic()
@@ -414,8 +414,6 @@ class Board(Peer):
 
     def _on_command(self, fields):
         pnum = int(fields['PNum'])
-        if not self.obeys:
-            return
         if self.newest is not None and not 0 < (pnum - self.newest) % 2 ** 32 <= 65536:
             self._refuse(fields, 'DUPLICATE' if pnum == self.newest else 'STALE')
             return

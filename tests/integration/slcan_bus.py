@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""slcan_bus (tests/transports/can/kernel/slcan_bus.cpp) with its nodes as interfaces slcan0, slcan1, … of this kernel."""
+"""slcan_bus (tests/transports/can/kernel/slcan_bus.cpp) with its nodes as interfaces slcan0 and slcan1 of this kernel."""
 import fcntl
 import json
 import os
@@ -16,6 +16,7 @@ from r4_process import PATIENCE_S, R4
 PROGRAM = os.environ.get('R4_SLCAN_BUS') or pathlib.Path(R4).parent / 'tests/slcan_bus'
 N_SLCAN = 17
 SIOCGIFNAME = 0x8910
+BITRATE = 500000
 
 
 def ip(*arguments):
@@ -25,21 +26,17 @@ def ip(*arguments):
 class SlcanBus:
     """One bus. `interfaces` are the nodes in order."""
 
-    def __init__(self, nodes=2, bitrate=125000, txqueuelen=1000):
-        self.process = subprocess.Popen(
-            [PROGRAM, '--nodes', str(nodes), '--bitrate', str(bitrate)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.bitrate = bitrate
+    def __init__(self, txqueuelen=1000):
+        self.process = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.answers = queue.Queue()
         self.states = queue.Queue()
         self.ptys = json.loads(self.process.stdout.readline())['ptys']
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
-        self.interfaces = [f'slcan{number}' for number in range(nodes)]
+        self.interfaces = [f'slcan{number}' for number in range(len(self.ptys))]
         for interface, pty in zip(self.interfaces, self.ptys):
             ip('link', 'set', self.attach(pty), 'name', interface)
-            ip('link', 'set', interface, 'txqueuelen', str(txqueuelen), 'type', 'can', 'bitrate',
-               str(bitrate))
+            ip('link', 'set', interface, 'txqueuelen', str(txqueuelen), 'type', 'can', 'bitrate', str(BITRATE))
             ip('link', 'set', interface, 'up')
 
     @staticmethod

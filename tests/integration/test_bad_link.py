@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4 sim --link: the effects on the datagrams and on the link."""
-import pytest
-
 from machine import within_ms
-from r4_process import Board, is_link, is_state, monitor, objects, run
+from r4_process import Board, is_link, is_state, monitor, run
 
 
-def behind(link, url='udp://127.0.0.1:0'):
-    return Board(url, options=('--link', link))
+def behind(link):
+    return Board('udp://127.0.0.1:0', options=('--link', link))
 
 
 def suffered(board):
@@ -19,12 +17,6 @@ def suffered(board):
 def share(of, counters):
     came_in = counters['passed'] - counters['duplicated'] + counters['lost'] + counters['cut']
     return counters[of] / came_in
-
-
-def bench(board, *options):
-    result = run('bench', board.host_url, '--duration', '1', '--json', *options, timeout=60)
-    assert result.returncode == 0, result
-    return objects(result.stdout)[0]
 
 
 def test_loss_is_counted_and_commands_are_still_confirmed():
@@ -41,28 +33,8 @@ def test_loss_is_counted_and_commands_are_still_confirmed():
     assert sent['duplicated'] == sent['corrupted'] == sent['cut'] == sent['overflow'] == 0
 
 
-def test_a_delay_lengthens_every_round_trip():
-    with behind('delay=15ms+-5') as board:
-        measured = bench(board)
-        received, sent = suffered(board)
-    assert measured['round_trip_us']['p50'] > 20_000 and measured['unanswered'] == 0, measured
-    assert share('lost', sent) == share('lost', received) == 0
-
-
-def test_a_duplicate_command_is_executed_once():
-    with behind('duplicate=100%') as board:
-        assert run('send', board.host_url, 'R:1,On', 'O:358,1,1').returncode == 0
-        board.executed('O:358,1,1')
-        received, sent = suffered(board)
-        executed = [each['executed']['command'] for each in board.log if 'executed' in each]
-    assert executed.count('O:358,1,1') == executed.count('R:1,On') == 1
-    assert share('duplicated', received) == share('duplicated', sent) == 1
-
-
-@pytest.mark.parametrize('transport', ['udp', 'pty'])
-def test_damaged_datagrams_are_reported_and_never_executed(transport, tmp_path):
-    urls = {'udp': 'udp://127.0.0.1:0', 'pty': f'pty:{tmp_path}/board'}
-    with behind('corrupt=20%,seed=5', urls[transport]) as board:
+def test_damaged_datagrams_are_reported_and_never_executed():
+    with behind('corrupt=20%,seed=5') as board:
         assert run('send', board.host_url, 'R:1,On', 'O:358,1,1', '--timeout', '5').returncode == 0
         with monitor(board.host_url) as host:
             damaged = host.next(lambda each: each['type'] == 'error')

@@ -41,14 +41,10 @@ def test_the_rows_add_up_to_the_total():
     assert math.isclose(total['load'], total['bits'] / total['bitrate'], rel_tol=1e-9)
 
 
-def test_the_number_of_frames_follows_iso_tp():
-    """The board's plain heartbeat: 6 bytes in the first frame, 7 in each consecutive frame."""
-    rows, _ = planned('--plain', '--boards', '1')
-    heartbeat = rows['board heartbeat']
-    assert math.isclose(heartbeat['frames'] / heartbeat['datagrams'],
-                        1 + math.ceil((heartbeat['bytes'] - 6) / 7), abs_tol=1)
-    rows, _ = planned('--plain', '--boards', '1', '--fd')
-    assert rows['board heartbeat']['frames'] == rows['board heartbeat']['datagrams']  # one FD frame per datagram
+def test_can_fd_lowers_the_load():
+    classic, _ = planned('--boards', '4')
+    fd, _ = planned('--boards', '4', '--fd', '--dbitrate', '8000000')
+    assert fd['total']['load'] < classic['total']['load'] and fd['total']['dbitrate'] == 8000000
 
 
 def test_r4_bus_warns_above_a_load_of_80_percent():
@@ -56,25 +52,6 @@ def test_r4_bus_warns_above_a_load_of_80_percent():
     assert result.returncode == 0
     assert re.fullmatch(r'r4: warning: the bus: .+; .+\n', result.stderr)
     assert run('bus', '--boards', '11').stderr == ''
-
-
-def test_the_reported_most_boards_and_highest_rate_are_exact():
-    rows, _ = planned()
-    boards, rate = rows['total']['most_boards'], rows['total']['highest_rate']
-    for more in (('--boards', str(boards)), ('--rate', str(rate))):
-        rows, result = planned(*more)
-        assert rows['total']['load'] <= 0.8 and result.stderr == ''
-    for more in (('--boards', str(boards + 1)), ('--rate', str(rate + 1))):
-        rows, result = planned(*more)
-        assert rows['total']['load'] > 0.8 and 'warning' in result.stderr
-
-
-def test_load_follows_the_bit_rate():
-    fast, _ = planned('--boards', '4')
-    slow, _ = planned('--boards', '4', '--bitrate', '500000')
-    assert math.isclose(slow['total']['load'], 2 * fast['total']['load'], rel_tol=1e-6)
-    fd, _ = planned('--boards', '4', '--fd', '--dbitrate', '8000000')
-    assert fd['total']['load'] < fast['total']['load'] and fd['total']['dbitrate'] == 8000000
 
 
 @pytest.mark.parametrize('arguments, words', [

@@ -63,6 +63,7 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['monitor', 'serial:///dev/tty-that-is-not-there'], OPEN, 'tty-that-is-not-there'),
     (['monitor', 'udp://no-such-host.invalid'], OPEN, 'no-such-host.invalid'),
     (['monitor', NO_BOARD, '--duration', '0.3'], REFUSED, 'nothing was received'),
+    (['bench', NO_BOARD], REFUSED, 'nothing was received'),
     (['send', NO_BOARD, 'O:1,1,1', '--timeout', '0.3'], REFUSED, 'not confirmed within 3'),
     (['stop', NO_BOARD, '--timeout', '0.3'], REFUSED, '^r4: E:STOP to udp://127.0.0.1:9.*CUT THE POWER'),
     (['stop', 'serial:///dev/tty-that-is-not-there'], OPEN, 'CUT THE POWER'),

@@ -14,7 +14,7 @@ import pytest
 from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, lasts, objects, run, text_of,
                         wait_for)
 
-DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
+DATA_BAD, USAGE, REFUSED, OPEN = 1, 2, 3, 4
 
 
 @pytest.fixture(name='board')

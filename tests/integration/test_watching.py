@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Programs that watch a board, alone or beside a driving program, in either order of start."""
 import itertools
-import re
 import signal
 import socket
-import zlib
 
 import pytest
 
 from lan import Lan
 from machine import within
-from r4_process import PATIENCE_S, Board, driving, is_state, lasts, monitor, run, watch
+from r4_process import Board, driving, is_state, run, watch
 
 
 @pytest.fixture(name='board')
@@ -34,20 +32,6 @@ def test_monitor_shows_a_board_without_a_controlling_host(board):
         times = [watcher.next(is_state)['t'] for _ in range(100)]
         assert sorted(times) == times and 900 <= times[-1] - times[0] <= 1300
     assert not [each for each in board.log if each.get('state') == 'ACTIVE']
-
-
-def test_monitor_and_send_work_in_either_order(board):
-    with watch(board.host_url) as early:
-        early.next(is_safe_for_the_link)
-        with driving(board.host_url, 'O:358,1,1') as host, watch(board.host_url) as late:
-            late.next(drives)
-            early.next(drives)
-            host.end()
-            for each in (early, late):
-                each.next(is_safe_for_the_link)
-            assert run('send', board.host_url, 'R:1,On', 'O:100,1,1').returncode == 0
-        early.next(lambda each: is_state(each) and each['fields'].get('OSMC1') == [100, 1])
-        early.next(is_safe_for_the_link)
 
 
 def test_the_first_steps_of_the_help_work_as_printed():
@@ -94,20 +78,6 @@ def test_a_fifth_watcher_is_refused_until_another_watcher_ends(board):
             each.__exit__()
 
 
-def test_stop_works_beside_a_controlling_program(board):
-    with driving(board.host_url, 'O:358,1,1'), watch(board.host_url) as watcher:
-        watcher.next(drives)
-        assert run('stop', board.host_url).returncode == 0
-        watcher.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 2)
-
-
-def test_a_monitor_with_control_is_a_host(board):
-    with monitor(board.host_url) as host:
-        board.state('ACTIVE')
-        host.next(is_state)
-        assert run('send', board.host_url, 'O:358,1,1').returncode == 3
-
-
 def test_a_watcher_finds_the_board_again_after_a_restart():
     with Board('udp://127.0.0.1:0', options=['--stdin'], stdin=-1) as board, watch(board.host_url) as watcher:
         watcher.next(is_safe_for_the_link)
@@ -132,56 +102,6 @@ def test_a_watcher_on_a_cable_loses_no_state(tmp_path):
             # At 100 Hz, the board drops a state that has waited at a serial port for 30 ms.
             waited = 100 * within(0)
             assert max(steps) <= 2 + waited and sum(steps) < 60 + waited, 'more than the numbers of answers are missing'
-
-
-class Stranger:
-    """A watcher without r4, with its own port."""
-
-    def __init__(self, board):
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.settimeout(0.3)
-        self.to = ('127.0.0.1', int(board.url.rsplit(':', 1)[1]))
-        self.pnum = itertools.count(5)
-
-    def ask(self, lease, echo):
-        text = f'W:{lease};PNum:{next(self.pnum)};T:{echo};^'.encode()
-        self.socket.sendto(text + hex(zlib.crc32(text)).encode() + b'^', self.to)
-
-    def hears(self):
-        try:
-            return self.socket.recv(2000).decode()
-        except TimeoutError:
-            return ''
-
-
-def test_only_a_watcher_that_echoes_its_lease_gets_states(board):
-    stranger, other = Stranger(board), Stranger(board)
-    stranger.ask('1000', 0)
-    answer = stranger.hears()
-    told = int(re.search(r'N:5,STALE;LEASE:(\d+);', answer)[1])
-    now = int(re.search(r';T:(\d+);', answer)[1])
-    for echo in (now, now + 1, told + 1):
-        lasts(0.03)
-        stranger.ask('1000', echo)
-        assert stranger.hears().startswith('N:')
-    lasts(0.03)
-    other.ask('1000', told)
-    assert other.hears().startswith('N:') and not other.hears()
-    stranger.ask('100', told)
-    assert 'SAFE:1' in stranger.hears()
-    stranger.ask('0', told)
-    lasts(0.1)
-    while stranger.hears():
-        pass
-
-
-def test_a_silent_watcher_gets_states_for_at_most_two_seconds(board):
-    stranger = Stranger(board)
-    stranger.ask('50', 0)
-    stranger.ask('50', int(re.search(r'LEASE:(\d+)', stranger.hears())[1]))
-    heard = list(itertools.takewhile(bool, iter(stranger.hears, None)))
-    times = [int(re.search(r';T:(\d+);', each)[1]) for each in heard]
-    assert PATIENCE_S and 1900 <= times[-1] - times[0] <= 2020
 
 
 def test_the_configured_peer_gets_only_heartbeats_beside_a_watcher(board):

@@ -112,21 +112,6 @@ def test_the_board_is_safe_in_time_when_a_browser_falls_silent():
         assert '500 ms' in page.next('control', lambda each: not each['you'])['why']
 
 
-def test_a_browser_that_echoes_an_old_time_loses_control():
-    with one_board() as (board, web), Page(web) as page:
-        page.drive()
-        page.freeze()
-        heard = page.newest
-        frozen = time.monotonic()
-        while not any(each['type'] == 'control' and not each['you'] for each in page.messages):
-            page.say(type='alive', now=heard)
-            assert time.monotonic() - frozen < within(2 * LIMIT_S)
-            lasts(0.02)
-        board.state('SAFE', 'link')
-        page.say(type='alive', now=2**63)
-        assert not page.ask(type='command', board=0, command='O:358,1,1')['ok']
-
-
 def test_the_board_is_safe_at_once_when_the_browser_disconnects():
     with one_board() as (board, web), Page(web) as other:
         with Page(web) as page:

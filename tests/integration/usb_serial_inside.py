@@ -10,7 +10,6 @@ import pathlib
 import pty
 import queue
 import re
-import signal
 import socket
 import statistics
 import subprocess
@@ -76,7 +75,6 @@ def listed_with_who_controls_it():
         held = listed()
         assert held['board_id'] == 'sim-1' and held['busy'], held
         assert held['held_by'] == {'program': 'r4', 'pid': host.process.pid, 'controls': True}, held
-        print(*run('list').stdout.split('\n\n', maxsplit=1)[0].splitlines(), sep='\n')
         host.skip_past()
 
 
@@ -87,30 +85,28 @@ def streams_at_the_boards_rate():
                               check=False)
         # While r4 has the port, only root can open the port.
         assert rate.stdout == '1000000\n' if os.geteuid() == 0 else 'busy' in rate.stderr, rate
-        states = [host.next(is_state) for _ in range(200)]
+        states = [host.next(is_state) for _ in range(50)]
         assert host.end() == 0
     steps = [later['t'] - earlier['t'] for earlier, later in zip(states, states[1:])]
     assert statistics.median(steps) == 10, steps
 
 
-def unplugged_and_plugged_in_again(url, times):
+def unplugged_and_plugged_in_again():
     reports = kernel_reports()
-    with monitor(url) as host:
+    with monitor('serial:?sn=R4-0001') as host:
         host.next(is_link('active'))
-        for _ in range(times):
-            host.next(is_state)
-            subprocess.run(['r4-usb', 'unplug'], check=True)
-            removed = reports.get(timeout=PATIENCE_S)
-            assert removed[1] == 'remove'
-            down = host.next(is_down)
-            delay = down['came'] - removed[0]
-            subprocess.run(['r4-usb', 'plug'], check=True)
-            added = reports.get(timeout=PATIENCE_S)
-            assert added[1] == 'add'
-            active = host.next(is_link('active'))
-            host.next(is_state)
-            print(f"down {delay * 1000:.1f} ms after the kernel's report, "
-                  f"in control again {(active['came'] - added[0]) * 1000:.0f} ms after it")
+        host.next(is_state)
+        subprocess.run(['r4-usb', 'unplug'], check=True)
+        removed = reports.get(timeout=PATIENCE_S)
+        assert removed[1] == 'remove'
+        down = host.next(is_down)
+        subprocess.run(['r4-usb', 'plug'], check=True)
+        added = reports.get(timeout=PATIENCE_S)
+        assert added[1] == 'add'
+        active = host.next(is_link('active'))
+        host.next(is_state)
+        print(f"down {(down['came'] - removed[0]) * 1000:.1f} ms after the kernel's report, "
+              f"in control again {(active['came'] - added[0]) * 1000:.0f} ms after it")
         assert host.end() == 0, host.errors
 
 
@@ -141,9 +137,6 @@ def one_of_two_paths(terminal, commands):
     reports = kernel_reports()
     port = free_port()
 
-    def gateway():
-        return Running('bridge', f'udp://127.0.0.2:{port}', f'serial://{terminal}', '--json')
-
     def by_usb(order, action):
         def act():
             subprocess.run(['r4-usb', order], check=True)
@@ -152,28 +145,17 @@ def one_of_two_paths(terminal, commands):
             return at
         return act
 
-    with gateway() as first, HostOnPaths([f'serial://{PORT}', f'udp://127.0.0.2:{port}?listen=0'],
-                                       [PORT, '127.0.0.2']) as host:
+    with Running('bridge', f'udp://127.0.0.2:{port}', f'serial://{terminal}', '--json'), \
+            HostOnPaths([f'serial://{PORT}', f'udp://127.0.0.2:{port}?listen=0'], [PORT, '127.0.0.2']) as host:
         def both():
             host.goes_on(50)  # until the board has also joined both paths
 
         both()
-        for _ in range(2):
-            host.loses(PORT, by_usb('unplug', 'remove'))
-            host.goes_on()
-            host.has_again(PORT, by_usb('plug', 'add'))
-            both()
-        host.loses_by_silence('127.0.0.2', lambda: first.signal(signal.SIGSTOP))
-        host.has_again('127.0.0.2', lambda: first.signal(signal.SIGCONT))
-        both()
-        host.loses_by_silence('127.0.0.2', lambda: first.signal(signal.SIGKILL))
+        host.loses(PORT, by_usb('unplug', 'remove'))
         host.goes_on()
-        with gateway() as second:
-            since = time.monotonic()
-            host.has_again('127.0.0.2', lambda: since)
-            both()
-            commands.write_text(json.dumps(host.commands_at_its_end()))
-            assert second.process.poll() is None
+        host.has_again(PORT, by_usb('plug', 'add'))
+        both()
+        commands.write_text(json.dumps(host.commands_at_its_end()))
 
 
 def uploads_to_the_board_that_it_stopped():
@@ -197,6 +179,5 @@ listed_with_who_controls_it()
 streams_at_the_boards_rate()
 shared_by_programs()
 uploads_to_the_board_that_it_stopped()
-unplugged_and_plugged_in_again('serial:?sn=R4-0001', times=2)
-unplugged_and_plugged_in_again(f'serial://{PORT}', times=1)
+unplugged_and_plugged_in_again()
 one_of_two_paths(TERMINAL, pathlib.Path(sys.argv[1]))

@@ -75,7 +75,6 @@ class CanBusModel {
   bool send(int node, const CanFrame& frame);
   // All nodes see the next `count` frames damaged.
   void corrupt_next(unsigned count) { corrupt_next_ = count; }
-  void set_corrupted(double probability) { options_.corrupted = probability; }
   // All nodes see the frames of this node damaged, so that this node goes bus-off.
   void spoil(int node, bool spoiled) { to_node(node).spoiled = spoiled; }
   // Connects the node to the bus or disconnects it. A disconnected node does not send, receive or

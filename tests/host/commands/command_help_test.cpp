@@ -108,14 +108,5 @@ TEST(CommandHelp, ShowsTheCommandThatAnInvalidTextBeginsWith) {
   EXPECT_TRUE(contains(bad_command("G:1", Refusal::unknown).fix, "use one of O:pwm,dir,ch D:"));
 }
 
-TEST(CommandHelp, ShowsTheFormOfACommandWithAnInvalidValue) {
-  EXPECT_EQ(bad_command(Command::dac(3, Millivolts(1)), Refusal::channel).fix,
-            "use X:DAC,channel,mV with channel 1-2, mV 0-3300");
-  EXPECT_EQ(bad_command(Command::stop(), Refusal::format).fix, "use E:STOP");
-  EXPECT_TRUE(contains(bad_command(Command::setting("rate", "0"), Refusal::range).fix, "1-1000"));
-  EXPECT_EQ(bad_command(Command::setting("password", "eeeeeeee"), Refusal::range).thing,
-            "C:password,...");
-}
-
 }  // namespace
 }  // namespace r4::test

@@ -78,15 +78,6 @@ TEST_P(ShippedDevice, MeasuresCorrectlyAfterAnyEarlierSetting) {
   }
 }
 
-TEST_F(DescribedDevice, IsNotWrittenToIfItNeedsNoSetUp) {
-  board_.attach(Device::from("ina219"));
-  const std::vector<std::string> executed = simulated_.executed();
-  ASSERT_FALSE(executed.empty());
-  for (const std::string& command : executed) {
-    EXPECT_FALSE(command.starts_with("X:WRITE")) << command;
-  }
-}
-
 TEST_F(DescribedDevice, MeasuresNothingAfterAResetUntilItIsSetUpAgain) {
   for (const auto& [name, value] :
        {std::pair("mpu6050", "accel_z"), std::pair("icm20948@0x69", "accel_z"),
@@ -112,14 +103,6 @@ TEST_F(DescribedDevice, MeasuresNothingAfterAResetUntilItIsSetUpAgain) {
       board_.i2c().poll_off(slot);
     }
   }
-}
-
-TEST_F(DescribedDevice, IsReadTogetherWithOtherDevices) {
-  const auto devices = Device::from({"bno055", "ina219", "as5600@0x36:7"});
-  for (const Device& each : devices) board_.attach(each);
-  EXPECT_NEAR(wait_for(devices[2], "angle"), std::numbers::pi / 2, 1e-9);
-  EXPECT_NEAR(wait_for(devices[1], "voltage"), 12.16, 1e-9);
-  EXPECT_NEAR(wait_for(devices[0], "accel_z"), 9.81, 1e-9);
 }
 
 }  // namespace

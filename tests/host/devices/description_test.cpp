@@ -69,18 +69,21 @@ TEST(DeviceDescription, DecodesEachKindOfNumber) {
   EXPECT_FALSE(decode(2, {0, 0, 0, 0, 0}).has_value()) << "the byte of this value is missing";
 }
 
+void put_reading(State& state, int slot, const Bytes& bytes, std::uint32_t t_ms = 0) {
+  I2cReading& reading = state.raw.i2c[slot - 1];
+  reading.data.size = static_cast<std::uint8_t>(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), reading.data.bytes);
+  reading.t_ms = t_ms;
+}
+
 TEST(Device, HasNoMeasurementOfAnInvalidValue) {
   const Device lidar(DeviceDescription::load("vl53l0x"), 0x29);
   State state;
-  I2cReading& read = state.raw.i2c[0];
-  read.data.size = 12;
-  read.data.bytes[10] = 0x01;  // 300 mm
-  read.data.bytes[11] = 0x2C;
   const std::size_t distance = lidar.description().find("distance").value();
-  read.data.bytes[0] = 11 << 3;  // the range is valid
+  put_reading(state, 1, {11 << 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x01, 0x2C});  // 300 mm, valid
   EXPECT_TRUE(lidar.counts(state, distance));
   EXPECT_DOUBLE_EQ(lidar.reading(state, distance).number.value(), 0.3);
-  read.data.bytes[0] = 2 << 3;
+  put_reading(state, 1, {2 << 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x01, 0x2C});
   EXPECT_FALSE(lidar.counts(state, distance));
   EXPECT_FALSE(lidar.reading(state, distance).number);
   EXPECT_EQ(lidar.reading(state, "status").number, 2);
@@ -101,15 +104,11 @@ constexpr std::string_view gauge =
 TEST(Device, HasNoMeasurementUntilItIsSetUp) {
   const Device device(DeviceDescription::parse(gauge), 0x48);
   State state;
-  state.raw.i2c[0].data.size = 1;
-  state.raw.i2c[0].data.bytes[0] = 0;
+  put_reading(state, 1, {0});
   EXPECT_FALSE(device.is_set_up(state).has_value()) << "the modes were not read yet";
   EXPECT_FALSE(device.reading(state, "height").number);
-  I2cReading& modes = state.raw.i2c[1];
-  modes.data.size = 2;
   const auto set_up_with = [&](std::uint8_t mode, std::uint8_t status) {
-    modes.data.bytes[0] = mode;
-    modes.data.bytes[1] = status;
+    put_reading(state, 2, {mode, status});
     return device.is_set_up(state).value();
   };
   EXPECT_FALSE(set_up_with(0, 5));
@@ -162,11 +161,9 @@ TEST(Device, ComparesAScaledConditionAsWritten) {
                                                "value x s 1 u8 only mode 0.3\n"),
                       0x40);
   State state;
-  state.raw.i2c[0].data.size = 2;
-  state.raw.i2c[0].data.bytes[0] = 3;
-  state.raw.i2c[0].data.bytes[1] = 9;
+  put_reading(state, 1, {3, 9});
   EXPECT_EQ(device.reading(state, "x").number, 9) << "3 times 0.1 is not quite 0.3";
-  state.raw.i2c[0].data.bytes[0] = 4;
+  put_reading(state, 1, {4, 9});
   EXPECT_FALSE(device.reading(state, "x").number);
 }
 
@@ -180,13 +177,11 @@ TEST(Device, ReplacesADeviceWithItsAddressOrSlot) {
 TEST(Device, AnEncoderWithoutItsMagnetHasNoAngle) {
   const Device encoder(DeviceDescription::load("as5600"), 0x36);
   State state;
-  state.raw.i2c[0].data.size = 2;
-  state.raw.i2c[0].data.bytes[0] = state.raw.i2c[0].data.bytes[1] = 0;
+  put_reading(state, 1, {0, 0});
   EXPECT_FALSE(encoder.reading(state, "angle").number) << "the status was not read yet";
-  state.raw.i2c[1].data.size = 1;
-  state.raw.i2c[1].data.bytes[0] = 0x20;
+  put_reading(state, 2, {0x20});
   EXPECT_EQ(encoder.reading(state, "angle").number, 0);
-  state.raw.i2c[1].data.bytes[0] = 0x10;
+  put_reading(state, 2, {0x10});
   EXPECT_FALSE(encoder.reading(state, "angle").number);
 }
 
@@ -365,22 +360,16 @@ TEST(Device, IsNamedWithItsAddressAndSlot) {
 TEST(Device, DecodesTheSlotsOfAState) {
   const Device power = Device::from("ina219@0x40:3");
   State state;
-  const auto put = [&](int slot, const Bytes& bytes, std::uint32_t t_ms) {
-    I2cReading& reading = state.raw.i2c[slot - 1];
-    reading.data.size = static_cast<std::uint8_t>(bytes.size());
-    std::copy(bytes.begin(), bytes.end(), reading.data.bytes);
-    reading.t_ms = t_ms;
-  };
   EXPECT_FALSE(power.reading(state, "voltage").number) << "nothing was read yet";
   // TI SBOS448G, 8.5.1: 11.98 V, 20 mV over the shunt.
-  put(3, {0x07, 0xD0}, 1000);
-  put(4, {0x5D, 0x98}, 1002);
+  put_reading(state, 3, {0x07, 0xD0}, 1000);
+  put_reading(state, 4, {0x5D, 0x98}, 1002);
   const DeviceReading voltage = power.reading(state, "voltage");
   EXPECT_DOUBLE_EQ(voltage.number.value(), 11.98);
   EXPECT_EQ(voltage.t_ms, 1002U);
   EXPECT_DOUBLE_EQ(power.reading(state, "current").number.value(), 0.2);
   EXPECT_EQ(power.readings(state).size(), power.description().values.size());
-  put(3, {0x07}, 1000);
+  put_reading(state, 3, {0x07}, 1000);
   EXPECT_FALSE(power.reading(state, "current").number) << "the reading is of another device";
   EXPECT_THROW(power.reading(state, "amps"), Error);
 }

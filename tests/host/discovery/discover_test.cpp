@@ -33,17 +33,14 @@ DiscoveryOptions by_udp(std::uint16_t port) {
   return options;
 }
 
-TEST(Discovery, OnlyReturnsTheBoardThatWasFound) {
+TEST(Discovery, OnlyReturnsTheBoardThatWasFoundOnOneOrSeveralTransports) {
   EXPECT_EQ(discovery_of({found_board("udp:?id=b-1", "b-1")}).only().url, "udp:?id=b-1");
   EXPECT_EQ(discovery_of({found_board("serial:///dev/ttyACM0", "")}).only().url,
             "serial:///dev/ttyACM0");
-}
-
-TEST(Discovery, ABoardOnSeveralTransportsCountsAsOneBoard) {
-  const Discovery all =
+  const Discovery on_several_transports =
       discovery_of({found_board("serial:///dev/ttyACM0", "b-1"),
                     found_board("can://can0?node=1", "b-1"), found_board("udp:?id=b-1", "b-1")});
-  EXPECT_EQ(all.only().url, "serial:///dev/ttyACM0");
+  EXPECT_EQ(on_several_transports.only().url, "serial:///dev/ttyACM0");
 }
 
 TEST(Discovery, TheErrorForNoBoardNamesTheSearchedTransports) {

@@ -235,18 +235,5 @@ TEST_F(AnsweredPath, ANewBoardOnTheOnlyPathCountsAsARestart) {
   EXPECT_FALSE(paths.two_boards());
 }
 
-TEST_F(OnePath, BusyEndsWhenAStateNamesACommandOfThisSession) {
-  heartbeat();
-  paths.on_busy(0, board_t(), now);
-  EXPECT_TRUE(paths.all_busy_until(now).has_value());
-  pass(10);
-  paths.on_own_state(board_t(), now);
-  EXPECT_FALSE(paths.all_busy_until(now).has_value()) << "a state after BUSY proves control";
-  paths.on_busy(0, {}, now);
-  EXPECT_TRUE(paths.all_busy_until(now).has_value()) << "the transport hears another host";
-  pass(300);
-  EXPECT_FALSE(paths.all_busy_until(now).has_value());
-}
-
 }  // namespace
 }  // namespace r4

@@ -31,24 +31,6 @@ TEST(SessionPaths, ReportARestartOnceAndCarryAgain) {
   }
 }
 
-TEST_F(TwoPaths, DropDatagramsThatAreAnHourOld) {
-  const auto old = [&](std::uint32_t back_ms) {
-    return with_crc("AIN24:1.00;SAFE:0;PNum:17;T:" + std::to_string(robot.board_ms(0) - back_ms) +
-                    ";");
-  };
-  robot.told_states = 0;
-  for (int i = 0; i < 100; ++i) {
-    robot.bring(1, old(3'600'000));
-    robot.bring(1, old(5'000));
-    robot.run(10);
-  }
-  EXPECT_EQ(robot.restarts, 0);
-  EXPECT_FALSE(robot.went_back);
-  EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
-  EXPECT_TRUE(robot.session->in_control(robot.now()));
-  EXPECT_EQ(robot.trips, 0);
-}
-
 TEST(SessionPaths, SurviveALateHeartbeatOfABootingBoard) {
   SessionOptions options = RobotOnPaths::at_will();
   options.key = key_of(1);

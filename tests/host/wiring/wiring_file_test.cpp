@@ -9,6 +9,7 @@
 #include <string>
 
 #include "protocol/wiring/giga_pins.hpp"
+#include "tests/support/problems.hpp"
 
 namespace r4 {
 namespace {
@@ -26,16 +27,11 @@ std::string edited(const std::string& from, const std::string& to) {
 
 // Expects that reading `text` fails with these words.
 void expect_error(const std::string& text, const std::string& where, const std::string& words) {
-  try {
-    read_wiring(text, "robot.wiring");
-    ADD_FAILURE() << "read: " << words;
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::data);
-    const std::string told = error.what();
-    EXPECT_EQ(told.rfind(where, 0), 0U) << told;
-    EXPECT_NE(told.find(words), std::string::npos) << told;
-    EXPECT_FALSE(error.problem().fix.empty()) << told;
-  }
+  const Problem problem = test::problem_of([&] { read_wiring(text, "robot.wiring"); });
+  EXPECT_EQ(problem.kind, ErrorKind::data);
+  EXPECT_TRUE(problem.text().starts_with(where)) << problem.text();
+  EXPECT_TRUE(test::contains(problem.text(), words));
+  EXPECT_FALSE(problem.fix.empty()) << problem.text();
 }
 
 int line_of(const std::string& text, const std::string& part) {
@@ -118,14 +114,9 @@ TEST(WiringFile, HostileTextIsShownShortAndPrintable) {
        {hostile, "r4-wiring 1\n" + hostile + "\n", "r4-wiring 1\n" + hostile + " = D2\n",
         edited("handle = D42", "handle = " + hostile),
         edited("handle = D42", "handle = D42 " + hostile), std::string("\0\0\n", 3)}) {
-    try {
-      read_wiring(text);
-      ADD_FAILURE() << "read";
-    } catch (const Error& error) {
-      const std::string told = error.what();
-      EXPECT_LT(told.size(), 400U);
-      for (const char c : told) EXPECT_GE(static_cast<unsigned char>(c), 0x20) << told;
-    }
+    const std::string told = test::problem_of([&] { read_wiring(text); }).text();
+    EXPECT_LT(told.size(), 400U);
+    for (const char c : told) EXPECT_GE(static_cast<unsigned char>(c), 0x20) << told;
   }
   EXPECT_THROW(read_wiring(std::string(max_wiring_text + 1, '#')), Error);
   EXPECT_THROW(load_wiring("/dev/zero"), Error) << "endless";
@@ -155,13 +146,9 @@ TEST(WiringFile, ThePagesTablesAreThoseOfTheCheck) {
 }
 
 TEST(WiringFile, AFileThatCannotBeReadIsNamed) {
-  try {
-    load_wiring("/nowhere/robot.wiring");
-    ADD_FAILURE();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::open);
-    EXPECT_EQ(error.problem().thing, "/nowhere/robot.wiring");
-  }
+  const Problem problem = test::problem_of([] { load_wiring("/nowhere/robot.wiring"); });
+  EXPECT_EQ(problem.kind, ErrorKind::open);
+  EXPECT_EQ(problem.thing, "/nowhere/robot.wiring");
 }
 
 TEST(WiringNames, EverySignalAndPlaceHasItsOwn) {

@@ -7,30 +7,26 @@
 #include <string>
 #include <vector>
 
-#include "r4link/error.hpp"
 #include "r4link/link.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/problems.hpp"
 
 namespace r4::tool {
 namespace {
 
 using namespace std::chrono_literals;
-
-BoardOptions driving() {
-  BoardOptions options;
-  options.session.arming = Arming::off;
-  return options;
-}
+using test::at_will;
 
 TEST(BoardSet, NumbersTheBoardsOfAllPatternsInTheirOrder) {
-  BoardSet boards({"udp://127.0.0.1:20000-20001", "sim:?node=4"}, driving());
+  BoardSet boards({"udp://127.0.0.1:20000-20001", "sim:?node=4"}, at_will());
   ASSERT_EQ(boards.size(), 3U);
   EXPECT_EQ(boards[1].url, "udp://127.0.0.1:20001");
   for (std::size_t i = 0; i < boards.size(); ++i) EXPECT_EQ(boards[i].index, i);
-  EXPECT_THROW(BoardSet({"sim:?node=1", "sim:?node=1"}, driving()), Error);
+  EXPECT_THROW(BoardSet({"sim:?node=1", "sim:?node=1"}, at_will()), Error);
 }
 
 TEST(BoardSet, EndsAllSessionsAtOnce) {
-  BoardSet boards({"sim:?node=1", "sim:?node=2"}, driving());
+  BoardSet boards({"sim:?node=1", "sim:?node=2"}, at_will());
   std::vector<int> states(boards.size());
   for (SetBoard& each : boards) {
     each.board.on_state([&, index = each.index](const ReceivedState&, const Datagram&) {
@@ -54,13 +50,9 @@ TEST(BoardSet, NamesTheBoardThatWasNotHeard) {
   boards.end_by_signal(300ms);
   boards.run();
   boards.leave();
-  try {
-    boards.require_heard();
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::refused);
-    EXPECT_NE(error.problem().thing.find("127.0.0.1:9"), std::string::npos) << error.what();
-  }
+  const Problem problem = test::problem_of([&] { boards.require_heard(); });
+  EXPECT_EQ(problem.kind, ErrorKind::refused);
+  EXPECT_TRUE(test::contains(problem.thing, "127.0.0.1:9"));
 }
 
 TEST(BoardSet, WithoutBoardsEndsAtOnce) {

@@ -106,30 +106,24 @@ TEST(BusLog, UnpacksThePackedForm) {
   EXPECT_TRUE(dump.log.any_bad());
 }
 
-TEST(BusLog, ShowsWatchers) {
-  Dump dump;
-  dump.frame(0x605, "");
-  ASSERT_EQ(dump.printed.size(), 1U);
-  EXPECT_EQ(dump.printed[0]["type"], "watch");
-  EXPECT_EQ(dump.printed[0]["node"], 5);
-  EXPECT_FALSE(dump.log.any_bad());
-}
-
-TEST(BusLog, ShowsEmergencyStopsAndBoardsThatWentSafe) {
+TEST(BusLog, ShowsEmergencyStopsBoardsThatWentSafeAndWatchers) {
   Dump dump;
   dump.frame(0x010, "");
   dump.frame(0x025, "02");
   dump.frame(0x025, "63");
-  ASSERT_EQ(dump.printed.size(), 3U);
+  dump.frame(0x605, "");
+  ASSERT_EQ(dump.printed.size(), 4U);
   EXPECT_EQ(dump.printed[0]["type"], "emergency_stop");
   EXPECT_EQ(dump.printed[0]["from"], "host");
   EXPECT_EQ(dump.printed[1]["type"], "went_safe");
   EXPECT_EQ(dump.printed[1]["reason"], "stop");
   EXPECT_EQ(dump.printed[1]["node"], 5);
   EXPECT_EQ(dump.printed[2]["reason"], "fault");
+  EXPECT_EQ(dump.printed[3]["type"], "watch");
+  EXPECT_EQ(dump.printed[3]["node"], 5);
   EXPECT_FALSE(dump.log.any_bad());
   dump.frame(0x025, "");
-  EXPECT_EQ(dump.printed[3]["ok"], false);
+  EXPECT_EQ(dump.printed[4]["ok"], false);
 }
 
 TEST(BusLog, ReportsFailedTransfers) {

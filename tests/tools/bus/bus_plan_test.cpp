@@ -70,15 +70,6 @@ TEST(BusPlan, AgreesWithTheBusModel) {
   expect_agreement("4 boards, packed, 500 kbit/s", plan);
 }
 
-TEST(BusPlan, LoadGrowsWithBoardsAndFallsWithTheBitRate) {
-  const double one = load_of(plan_for(1, true)).total.load;
-  EXPECT_NEAR(load_of(plan_for(8, true)).total.load, 8 * one, 0.02 * 8 * one);
-  BusPlan slow = plan_for(1, true);
-  slow.bit_rate.nominal = 500000;
-  EXPECT_NEAR(load_of(slow).total.load, 2 * one, 1e-6);
-  EXPECT_LT(one, load_of(plan_for(1, false)).total.load);
-}
-
 TEST(BusPlan, FindsTheLargestRateAndNumberOfBoardsThatFit) {
   BusPlan plan = plan_for(8, true);
   const std::uint32_t boards = most_boards(plan, 0.8);

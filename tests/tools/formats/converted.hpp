@@ -60,11 +60,6 @@ inline Converted converted(std::string_view bytes, const std::string& from, cons
   return result;
 }
 
-// Converts to the format `by` and back.
-inline std::string and_back(const std::string& native, const std::string& by) {
-  return converted(converted(native, ".r4log", by).bytes, by, ".r4log").bytes;
-}
-
 // The paper's capture as a recording of one board, in both directions, with the two damaged
 // datagrams.
 std::string recorded_capture(const std::string& url = "udp://192.168.0.125");

@@ -13,19 +13,6 @@
 namespace r4::test {
 namespace {
 
-TEST(Mcap, RestoresTheRecordingByteByByte) {
-  for (const std::string& native :
-       {recorded_capture(), generated_recording(4, 5000), generated_recording(2, 100'000)}) {
-    const std::string mcap = converted(native, ".r4log", ".mcap").bytes;
-    for (const std::size_t piece : {7, 4096, 10'000'000}) {
-      if (piece < mcap.size() / 100'000) continue;
-      const Converted back = converted(mcap, ".mcap", ".r4log", piece);
-      EXPECT_EQ(back.bytes, native) << piece;
-      EXPECT_TRUE(back.damage.empty());
-    }
-  }
-}
-
 TEST(Mcap, ContinuesWithTheNextChunkAfterDamage) {
   const std::string native = generated_recording(5, 12'000);
   const std::string mcap = converted(native, ".r4log", ".mcap").bytes;
@@ -170,12 +157,6 @@ std::string as_chunk(const std::string& records, const std::string& compression)
   return bytes;
 }
 
-std::string topic_in(const McapRecord& record) {
-  Fields fields(record.content);
-  fields.number<std::uint32_t>();
-  return std::string(fields.string());
-}
-
 TEST(Mcap, ReadsFilesRewrittenByOtherTools) {
   const std::string native = generated_recording(8, 30'000);
   const std::string records = as_records(records_in(converted(native, ".r4log", ".mcap").bytes));
@@ -205,7 +186,7 @@ TEST(Mcap, KeepsTheBoardNameOfAFilteredTopic) {
       records_in(converted(recorded_capture(), ".r4log", ".mcap").bytes);
   std::erase_if(records, [](const McapRecord& each) {
     return each.op == Op::channel
-               ? topic_in(each) == "/r4log"
+               ? each.content.find("/r4log") != std::string::npos
                : each.op == Op::message && each.content.starts_with(std::string("\1\0", 2));
   });
   const Converted read = converted(mcap_file("", as_records(records)), ".mcap", ".r4log");

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// slcan_bus: a CAN bus as a process, exact to the bit, whose nodes are Linux network interfaces.
-//
-//     slcan_bus [--nodes 2] [--bitrate 125000]
+// slcan_bus: a CAN bus of 500 kbit/s as a process, exact to the bit, whose two nodes are Linux
+// network interfaces.
 //
 // slcan_bus opens a pty for each node and prints one line:
-// {"type":"ready","bitrate":125000,"ptys":["/dev/pts/3",…]}. Each pty uses the slcan protocol, as
-// the adapters of line discipline 17 of Linux do:
+// {"type":"ready","ptys":["/dev/pts/3","/dev/pts/4"]}. Each pty uses the slcan protocol, as the
+// adapters of line discipline 17 of Linux do:
 //
 //     fd = os.open(pty, os.O_RDWR | os.O_NOCTTY); fcntl.ioctl(fd, termios.TIOCSETD, 17 as an int)
-//     ip link set slcan0 type can bitrate 125000 && ip link set slcan0 up
+//     ip link set slcan0 type can bitrate 500000 && ip link set slcan0 up
 //
 // (or slcan_attach). The process keeps the ptys open, so the interfaces exist until the process
 // ends. The kernel sends C, S and O when an interface of known bit rate comes up. The process
@@ -31,11 +30,9 @@
 // Orders, one line each on stdin. The answer to each order is one line, {"type":"done"} or
 // {"type":"error","reason":…}. The process ends at the end of stdin.
 //
-//     noise P            damages each frame with probability P, so that it is sent again
 //     spoil K | heal K   damages the frames of node K: passive, then bus-off | ends the damage
 //     errors K TEC REC   sets the counters of node K, and its state accordingly
 //     away K | back K    disconnects node K from the bus: it does not acknowledge | reconnects it
-//     babble ID | quiet  another node sends this id (hex) and 8 bytes without a pause | ends it
 //     stall K | go K     does not read the pty of node K, as if the controller were full | reads it
 //     status             the answer has the counters of each node
 //
@@ -67,17 +64,14 @@
 namespace r4::test {
 namespace {
 
+constexpr std::uint32_t bitrate = 500000;
+constexpr std::size_t node_count = 2;
 constexpr unsigned warning_errors = 96;
 constexpr std::size_t mailboxes = 3;
 constexpr std::uint64_t look_every_ns = 5000000;
 constexpr std::uint64_t between_error_messages_ns = 10000000;
 constexpr std::array<std::uint32_t, 9> slcan_rates{10000,  20000,  50000,  100000, 125000,
                                                    250000, 500000, 800000, 1000000};
-
-struct Options {
-  int nodes = 2;
-  std::uint32_t bitrate = 125000;
-};
 
 [[noreturn]] void fail(const std::string& what) {
   std::fprintf(stderr, "slcan_bus: %s: %s\n", what.c_str(), std::strerror(errno));
@@ -137,7 +131,9 @@ std::string text_of(const CanFrame& frame) {
 
 class Bus {
  public:
-  explicit Bus(const Options& options);
+  Bus() {
+    for (std::size_t i = 0; i < node_count; ++i) add_adapter(i);
+  }
   [[noreturn]] void run();
 
  private:
@@ -170,28 +166,13 @@ class Bus {
   void tell_error(Adapter& adapter, CanBusError error);
   bool read_orders();
   std::string obey(const std::string& order);
-  void babble() { bus_.send(babbler_, babble_); }
   std::uint64_t now_ns() const { return clock_ns() - begun_ns_; }
 
-  const Options options_;
-  CanBusModel bus_;
+  CanBusModel bus_{CanBusOptions{.rate = {bitrate, 0}}};
   std::deque<Adapter> adapters_;
-  int babbler_ = 0;
-  bool babbling_ = false;
-  CanFrame babble_{};
   std::string orders_;
   const std::uint64_t begun_ns_ = clock_ns();
 };
-
-Bus::Bus(const Options& options) : options_(options), bus_({.rate = {options.bitrate, 0}}) {
-  for (int i = 0; i < options_.nodes; ++i) add_adapter(static_cast<std::size_t>(i));
-  CanNodeOptions babbler;
-  babbler.sent = [this](const CanFrame&) {
-    if (babbling_) babble();
-  };
-  babbler_ = bus_.add_node(babbler);
-  bus_.set_present(babbler_, false);
-}
 
 void Bus::add_adapter(std::size_t number) {
   Adapter& adapter = adapters_.emplace_back();
@@ -234,7 +215,7 @@ void Bus::run() {
   for (const Adapter& adapter : adapters_) {
     ptys += fmt::format("{}\"{}\"", ptys.empty() ? "" : ",", adapter.name);
   }
-  say(fmt::format(R"({{"type":"ready","bitrate":{},"ptys":[{}]}})", options_.bitrate, ptys));
+  say(fmt::format(R"({{"type":"ready","ptys":[{}]}})", ptys));
   for (;;) {
     std::vector<pollfd> waits{{STDIN_FILENO, POLLIN, 0}};
     for (const Adapter& adapter : adapters_) {
@@ -309,7 +290,7 @@ void Bus::take(Adapter& adapter, std::string_view line) {
     }
     case 'S': {
       const std::size_t rate = line.size() == 2 ? static_cast<std::size_t>(line[1] - '0') : 9;
-      adapter.right_rate = rate < slcan_rates.size() && slcan_rates[rate] == options_.bitrate;
+      adapter.right_rate = rate < slcan_rates.size() && slcan_rates[rate] == bitrate;
       return write(adapter, adapter.right_rate && !adapter.open ? ok : error);
     }
     case 'O':
@@ -397,26 +378,6 @@ std::string Bus::obey(const std::string& order) {
     return fmt::format(R"({{"type":"error","order":"{}","reason":"{}"}})", verb, reason);
   };
   const std::string done = R"({"type":"done"})";
-  if (verb == "noise") {
-    double probability = 0;
-    if (!(words >> probability)) return error("how probable?");
-    bus_.set_corrupted(probability);
-    return done;
-  }
-  if (verb == "babble") {
-    std::string id;
-    if (!(words >> id) || !parse(std::string_view(id), babble_.id, 16)) return error("which id?");
-    babble_.size = 8;
-    babbling_ = true;
-    bus_.set_present(babbler_, true);
-    babble();
-    return done;
-  }
-  if (verb == "quiet") {
-    babbling_ = false;
-    bus_.clear(babbler_);
-    return done;
-  }
   if (verb == "status") {
     std::string nodes;
     for (const Adapter& adapter : adapters_) {
@@ -460,16 +421,4 @@ std::string Bus::obey(const std::string& order) {
 }  // namespace
 }  // namespace r4::test
 
-int main(int argc, char** argv) {
-  r4::test::Options options;
-  for (int i = 1; i + 1 < argc; i += 2) {
-    const std::string_view name = argv[i];
-    const std::string_view value = argv[i + 1];
-    const bool good = (name == "--nodes" && r4::test::parse(value, options.nodes, 10)) ||
-                      (name == "--bitrate" && r4::test::parse(value, options.bitrate, 10));
-    if (good) continue;
-    std::fprintf(stderr, "slcan_bus: %s %s is not a valid option\n", argv[i], argv[i + 1]);
-    return 2;
-  }
-  r4::test::Bus(options).run();
-}
+int main() { r4::test::Bus().run(); }
