@@ -60,7 +60,7 @@ Course Course::towards(const Waypoint& goal, const r4::control::Pose& from) {
   // other side.
   double side = left_m < 0 ? -1 : 1;
   if (std::hypot(ahead_m, side * left_m - turning_m) < turning_m) side = -side;
-  // The tangent from the circle to the goal, seen from the circle's middle.
+  // The tangent from the circle to the goal: where on the circle it begins, seen from the centre.
   const double beyond_m = side * left_m - turning_m;
   const double distance_m = std::max(turning_m, std::hypot(ahead_m, beyond_m));
   double turn = std::atan2(beyond_m, ahead_m) + std::asin(turning_m / distance_m);

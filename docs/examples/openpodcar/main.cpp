@@ -93,7 +93,8 @@ int main(int argc, char** argv) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};
     sigaction(signal, nullptr, &before);
-    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);  // as SIGHUP under nohup
+    // An ignored signal stays ignored, such as SIGHUP under nohup.
+    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
   }
   try {
     std::string url;
@@ -118,7 +119,7 @@ int main(int argc, char** argv) {
     r4::sim::SimulatedRobot robot(model);
     r4::Board board(url.empty() ? robot.url() : url, options);
     return drive(board, course, start);
-  } catch (const r4::Error& error) {  // the thing, the reason and the fix
+  } catch (const r4::Error& error) {  // what(): the thing, the reason and the fix
     std::fprintf(stderr, "openpodcar: %s\n", error.what());
     return static_cast<int>(error.kind());
   }
