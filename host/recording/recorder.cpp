@@ -177,7 +177,7 @@ void Recorder::write() {
   put_in_order(unsettled_);
   put_in_order(batch_);
   std::stable_sort(order_.begin(), order_.end(),
-                   [](const Place& a, const Place& b) { return a.head.time < b.head.time; });
+                   [](const RecordAt& a, const RecordAt& b) { return a.head.time < b.head.time; });
   std::vector<char> rest;
   for (const auto& [head, at] : order_) {
     if (head.time <= written_until_) {
@@ -192,10 +192,10 @@ void Recorder::write() {
 
 void Recorder::put_in_order(const std::vector<char>& records) {
   for (std::size_t at = 0; at < records.size();) {
-    Place place{{}, &records[at]};
-    std::memcpy(&place.head, place.at, sizeof place.head);
-    at += sizeof place.head + place.head.size;
-    order_.push_back(place);
+    RecordAt found{{}, &records[at]};
+    std::memcpy(&found.head, found.at, sizeof found.head);
+    at += sizeof found.head + found.head.size;
+    order_.push_back(found);
   }
 }
 

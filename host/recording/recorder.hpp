@@ -67,7 +67,7 @@ class Recorder {
     std::uint16_t path;
     RecordKind kind;
   };
-  struct Place {
+  struct RecordAt {
     Head head;
     const char* at;
   };
@@ -89,7 +89,7 @@ class Recorder {
   RecordingWriter writer_;
   std::vector<char> batch_;
   std::vector<char> unsettled_;  // so new that earlier records may follow
-  std::vector<Place> order_;
+  std::vector<RecordAt> order_;
   Time written_until_{0};
   Time recorded_clock_{0};  // recorded change of the wall clock
   std::uint64_t recorded_dropped_ = 0;

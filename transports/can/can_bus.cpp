@@ -95,8 +95,8 @@ void CanBus::join_all(Member& member) {
 }
 
 void CanBus::leave(Member& member) noexcept {
-  for (Place& place : members_) {
-    if (place.member == &member) place.member = nullptr;
+  for (Membership& each : members_) {
+    if (each.member == &member) each.member = nullptr;
   }
   std::replace(out_of_.begin(), out_of_.end(), &member, static_cast<Member*>(nullptr));
   clear_places();
@@ -104,12 +104,12 @@ void CanBus::leave(Member& member) noexcept {
 
 bool CanBus::has(const Member* member) const {
   return std::any_of(members_.begin(), members_.end(),
-                     [member](const Place& place) { return place.member == member; });
+                     [member](const Membership& each) { return each.member == member; });
 }
 
 void CanBus::clear_places() {
   if (calling_ != 0 || sending_) return;
-  if (std::erase_if(members_, [](const Place& place) { return place.member == nullptr; }) != 0)
+  if (std::erase_if(members_, [](const Membership& each) { return each.member == nullptr; }) != 0)
     hear();
 }
 
@@ -123,10 +123,10 @@ void CanBus::hear() {
 
 bool CanBus::set_filters() {
   std::vector<std::uint32_t> ids;
-  for (const Place& place : members_) {
-    if (place.member == nullptr) continue;
-    if (place.all) return medium_->hear_everything();
-    ids.insert(ids.end(), place.ids.begin(), place.ids.end());
+  for (const Membership& each : members_) {
+    if (each.member == nullptr) continue;
+    if (each.all) return medium_->hear_everything();
+    ids.insert(ids.end(), each.ids.begin(), each.ids.end());
   }
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
@@ -146,8 +146,8 @@ void CanBus::listen() {
 }
 
 bool CanBus::someone_awaits_a_frame() const {
-  return std::any_of(members_.begin(), members_.end(), [](const Place& place) {
-    return place.member != nullptr && place.member->awaits_frame();
+  return std::any_of(members_.begin(), members_.end(), [](const Membership& each) {
+    return each.member != nullptr && each.member->awaits_frame();
   });
 }
 

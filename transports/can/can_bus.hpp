@@ -102,7 +102,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
  private:
   enum class Trouble : std::uint8_t { none, not_acknowledged, error_warning, error_passive, down };
-  struct Place {
+  struct Membership {
     Member* member;  // null: has left
     std::vector<std::uint32_t> ids;
     bool all;
@@ -146,7 +146,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   OperationSlot looking_;
   OperationSlot deafness_;  // the report that the kernel has refused the filters
 
-  std::vector<Place> members_;
+  std::vector<Membership> members_;
   std::size_t next_ = 0;  // index of the member that offers next
   int calling_ = 0;       // not 0 while members are called: no place is removed
   bool sending_ = false;

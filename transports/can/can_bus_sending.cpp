@@ -16,10 +16,10 @@ constexpr std::chrono::milliseconds retry_interval{1};
 // On a slow bus, flow control that waited for a whole datagram of telemetry would be late.
 void CanBus::send_urgent(std::uint32_t now_us) {
   CanFrame frame;
-  for (const Place& place : members_) {
-    while (place.member != nullptr && place.member->offer_urgent(now_us, frame) &&
+  for (const Membership& each : members_) {
+    while (each.member != nullptr && each.member->offer_urgent(now_us, frame) &&
            medium_->send_first(frame) == CanMedium::Outcome::done) {
-      place.member->frame_sent(now_us);
+      each.member->frame_sent(now_us);
     }
   }
 }

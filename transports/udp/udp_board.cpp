@@ -37,7 +37,7 @@ void UdpBoard::find_peer(const Endpoint& local) {
     throw Error(ErrorKind::usage, url_.text, "an IPv4 socket cannot send to an IPv6 peer",
                 "listen on [::]");
   }
-  audience_ = Place{host, {}};
+  audience_ = HostAddresses{host, {}};
 }
 
 void UdpBoard::take_what_is_there() {
@@ -64,17 +64,19 @@ void UdpBoard::received(std::string_view bytes) {
 }
 
 bool UdpBoard::reaches(Peer peer) const {
-  const Place* const at = peers_.find(peer);
+  const HostAddresses* const at = peers_.find(peer);
   return peer == everyone || (at != nullptr && audience_ && *at == *audience_);
 }
 
 void UdpBoard::follow_audience() {
-  const Place* const audience = peers_.find(peers_.audience());
+  const HostAddresses* const audience = peers_.find(peers_.audience());
   if (audience != nullptr && url_.peer_host.empty()) audience_ = *audience;
 }
 
 SendResult UdpBoard::transmit(std::string_view bytes, Peer to) {
-  const Place* const asker = to != everyone ? peers_.find(to) : audience_ ? &*audience_ : nullptr;
+  const HostAddresses* const asker = to != everyone ? peers_.find(to)
+                                     : audience_    ? &*audience_
+                                                    : nullptr;
   if (asker == nullptr) {
     ++counters_.tx_dropped;
     return SendResult::down;

@@ -31,10 +31,10 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
 
  private:
   // `at`: the own address to which the host sends; unspecified if the socket has one address only.
-  struct Place {
+  struct HostAddresses {
     Endpoint host;
     asio::ip::address at;
-    friend bool operator==(const Place&, const Place&) = default;
+    friend bool operator==(const HostAddresses&, const HostAddresses&) = default;
   };
 
   void listen() override {
@@ -52,9 +52,9 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
 
   static constexpr int peer_places = 16;
 
-  PeerTable<Place, peer_places> peers_;
-  asio::ip::address sent_to_;      // destination of the packet that is being read
-  std::optional<Place> audience_;  // the destination of datagrams for everyone
+  PeerTable<HostAddresses, peer_places> peers_;
+  asio::ip::address sent_to_;              // destination of the packet that is being read
+  std::optional<HostAddresses> audience_;  // the destination of datagrams for everyone
 };
 
 }  // namespace r4

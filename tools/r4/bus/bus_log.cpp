@@ -11,10 +11,10 @@ namespace {
 
 constexpr const char* record_it = "record with: candump -L INTERFACE";
 
-Json time_json(const BusTransfers::Place& place) {
-  if (!place.date.empty()) return place.date;
-  if (!place.time_us) return {};
-  return static_cast<double>(*place.time_us) / 1e6;
+Json time_json(const BusTransfers::LogPosition& position) {
+  if (!position.date.empty()) return position.date;
+  if (!position.time_us) return {};
+  return static_cast<double>(*position.time_us) / 1e6;
 }
 
 const char* fix_of(CandumpError error) {
@@ -39,10 +39,10 @@ const char* lane_name(CanIdKind kind) {
   }
 }
 
-Json beginning(const BusTransfers::Lane& lane, const BusTransfers::Place& place) {
+Json beginning(const BusTransfers::Lane& lane, const BusTransfers::LogPosition& position) {
   const CanIdKind kind = lane.meaning.kind;
-  return {{"line", place.line},
-          {"time", time_json(place)},
+  return {{"line", position.line},
+          {"time", time_json(position)},
           {"interface", lane.interface},
           {"node", lane.meaning.node},
           {"from", kind == CanIdKind::command ? "host" : "board"},
@@ -75,29 +75,29 @@ void BusLog::report_damage(std::uint64_t number, const char* reason, const char*
   print_(object);
 }
 
-void BusLog::on_frame(const CandumpLine& line, const BusTransfers::Place& place) {
+void BusLog::on_frame(const CandumpLine& line, const BusTransfers::LogPosition& position) {
   ++frames_;
   if (line.error_frame) {
     ++error_frames_;
     return;
   }
-  switch (transfers_.on_frame(line.interface, line.frame, place)) {
+  switch (transfers_.on_frame(line.interface, line.frame, position)) {
     case BusTransfers::Frame::taken:
       break;
     case BusTransfers::Frame::other:
       ++other_;
       break;
     case BusTransfers::Frame::too_many_interfaces:
-      report_damage(place.line, "more than 32 interfaces in one dump",
+      report_damage(position.line, "more than 32 interfaces in one dump",
                     "select the lines of one interface: grep ' can0 '",
                     {{"interface", std::string(line.interface)}});
   }
 }
 
 void BusLog::on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
-                          const CanFrame& frame, const BusTransfers::Place& place) {
+                          const CanFrame& frame, const BusTransfers::LogPosition& position) {
   ++raw_;
-  Json object{{"line", place.line}, {"time", time_json(place)}, {"interface", interface}};
+  Json object{{"line", position.line}, {"time", time_json(position)}, {"interface", interface}};
   if (meaning.kind == CanIdKind::emergency_stop) {
     object.update({{"from", "host"}, {"ok", true}, {"type", "emergency_stop"}});
     return print_(object);
@@ -121,11 +121,11 @@ void BusLog::on_raw_frame(const std::string& interface, const CanIdMeaning& mean
   print_(object);
 }
 
-void BusLog::on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
+void BusLog::on_failure(const BusTransfers::Lane& lane, const BusTransfers::LogPosition& position,
                         IsotpError error) {
   ++failed_;
   const Text reason = to_text(error);
-  Json object = beginning(lane, place);
+  Json object = beginning(lane, position);
   object.update({{"ok", false},
                  {"error", "isotp"},
                  {"reason", std::string_view(reason.data(), reason.size())}});

@@ -27,12 +27,12 @@ class BusLog final : BusTransfers::Handler {
   bool any_bad() const { return damaged_ + failed_ + bad_ != 0; }
 
  private:
-  void on_frame(const CandumpLine& line, const BusTransfers::Place& place);
+  void on_frame(const CandumpLine& line, const BusTransfers::LogPosition& position);
   void on_datagram(const BusTransfers::Lane& lane) override;
-  void on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
+  void on_failure(const BusTransfers::Lane& lane, const BusTransfers::LogPosition& position,
                   IsotpError error) override;
   void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
-                    const CanFrame& frame, const BusTransfers::Place& place) override;
+                    const CanFrame& frame, const BusTransfers::LogPosition& position) override;
   void report_damage(std::uint64_t number, const char* reason, const char* fix, Json rest);
 
   Print print_;

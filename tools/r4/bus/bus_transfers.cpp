@@ -24,7 +24,7 @@ BusTransfers::Lane::Lane(std::string name, const CanIdMeaning& what)
       receiver(listening_to(what.kind, what.node), bytes.data(), max_datagram) {}
 
 BusTransfers::Frame BusTransfers::on_frame(std::string_view interface, const CanFrame& frame,
-                                           const Place& place) {
+                                           const LogPosition& position) {
   const CanIdMeaning meaning = classify(frame);
   if (meaning.kind == CanIdKind::other) return Frame::other;
   Interface* const known = interface_of(interface);
@@ -32,15 +32,15 @@ BusTransfers::Frame BusTransfers::on_frame(std::string_view interface, const Can
   const bool raw = meaning.kind == CanIdKind::emergency_stop ||
                    meaning.kind == CanIdKind::went_safe || meaning.kind == CanIdKind::watch;
   if (raw) {
-    handler_.on_raw_frame(known->name, meaning, frame, place);
+    handler_.on_raw_frame(known->name, meaning, frame, position);
   } else {
-    on_lane_frame(*known, meaning, frame, place);
+    on_lane_frame(*known, meaning, frame, position);
   }
   return Frame::taken;
 }
 
 void BusTransfers::on_lane_frame(Interface& interface, const CanIdMeaning& meaning,
-                                 const CanFrame& frame, const Place& place) {
+                                 const CanFrame& frame, const LogPosition& position) {
   if (isotp_frame::is_flow_control(frame) && meaning.kind != CanIdKind::telemetry) {
     ++flow_control_;
     // A receiver sends flow control on the id of its own datagrams. So this frame answers a
@@ -61,19 +61,19 @@ void BusTransfers::on_lane_frame(Interface& interface, const CanIdMeaning& meani
   if (after.started != before.started) {
     lane.frames = 0;
     lane.answered = false;
-    lane.first = place;
+    lane.first = position;
   }
   if (after.started + after.consecutive != before.started + before.consecutive) {
     ++lane.frames;
-    lane.last = place;
+    lane.last = position;
   } else if (after.wrong_sequence_number != before.wrong_sequence_number) {
-    handler_.on_failure(lane, place, IsotpError::wrong_sequence_number);
+    handler_.on_failure(lane, position, IsotpError::wrong_sequence_number);
   } else if (after.overflow != before.overflow) {
     lane.frames = 1;
-    handler_.on_failure(lane, place, IsotpError::overflow);
+    handler_.on_failure(lane, position, IsotpError::overflow);
   } else if (after.malformed != before.malformed) {
     lane.frames = 1;
-    handler_.on_failure(lane, place, IsotpError::malformed);
+    handler_.on_failure(lane, position, IsotpError::malformed);
   } else {
     ++orphans_;  // a frame outside any transfer, or unexpected flow control
   }

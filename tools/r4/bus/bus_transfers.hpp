@@ -22,7 +22,7 @@ class BusTransfers {
  public:
   static constexpr std::size_t max_interfaces = 32;
 
-  struct Place {
+  struct LogPosition {
     std::uint64_t line = 0;
     std::uint64_t offset = 0;  // position in the file, in bytes
     std::optional<std::uint64_t> time_us;
@@ -39,16 +39,16 @@ class BusTransfers {
     IsotpReceiver receiver;
     bool answered = false;     // the other end has sent flow control
     std::uint32_t frames = 0;  // frames of the transfer so far
-    Place first, last;
+    LogPosition first, last;
   };
   class Handler {
    public:
     // lane.receiver holds a complete datagram, plain or packed.
     virtual void on_datagram(const Lane& lane) = 0;
-    virtual void on_failure(const Lane& lane, const Place& place, IsotpError error) = 0;
+    virtual void on_failure(const Lane& lane, const LogPosition& position, IsotpError error) = 0;
     // An emergency stop, a went-safe frame, or a watch frame.
     virtual void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
-                              const CanFrame& frame, const Place& place) = 0;
+                              const CanFrame& frame, const LogPosition& position) = 0;
 
    protected:
     ~Handler() = default;
@@ -57,7 +57,7 @@ class BusTransfers {
   explicit BusTransfers(Handler& handler) : handler_(handler) {}
 
   enum class Frame : std::uint8_t { taken, other, too_many_interfaces };
-  Frame on_frame(std::string_view interface, const CanFrame& frame, const Place& place);
+  Frame on_frame(std::string_view interface, const CanFrame& frame, const LogPosition& position);
   void pass_time(const std::optional<std::uint64_t>& time_us);
 
   std::vector<const Lane*> unfinished() const;
@@ -72,7 +72,7 @@ class BusTransfers {
   };
 
   void on_lane_frame(Interface& interface, const CanIdMeaning& meaning, const CanFrame& frame,
-                     const Place& place);
+                     const LogPosition& position);
   Interface* interface_of(std::string_view name);
   Lane& lane_of(Interface& interface, const CanIdMeaning& meaning);
   void end_late_transfers();

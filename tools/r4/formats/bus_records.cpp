@@ -13,8 +13,8 @@
 namespace r4::tool {
 namespace {
 
-Time time_of(const BusTransfers::Place& place) {
-  return Time{static_cast<std::int64_t>(place.time_us.value_or(0))};
+Time time_of(const BusTransfers::LogPosition& position) {
+  return Time{static_cast<std::int64_t>(position.time_us.value_or(0))};
 }
 
 }  // namespace
@@ -42,10 +42,10 @@ std::string bus_interface(const std::string& host) {
 }
 
 void BusRecords::on_frame(std::string_view interface, const CanFrame& frame,
-                          const BusTransfers::Place& place) {
-  transfers_.pass_time(place.time_us);
-  if (transfers_.on_frame(interface, frame, place) == BusTransfers::Frame::too_many_interfaces) {
-    damage(place, "a frame of an interface after the first 32");
+                          const BusTransfers::LogPosition& position) {
+  transfers_.pass_time(position.time_us);
+  if (transfers_.on_frame(interface, frame, position) == BusTransfers::Frame::too_many_interfaces) {
+    damage(position, "a frame of an interface after the first 32");
   }
 }
 
@@ -67,23 +67,23 @@ void BusRecords::on_datagram(const BusTransfers::Lane& lane) {
         plain.bytes});
 }
 
-void BusRecords::on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
-                            IsotpError error) {
+void BusRecords::on_failure(const BusTransfers::Lane& lane,
+                            const BusTransfers::LogPosition& position, IsotpError error) {
   const Text reason = to_text(error);
-  damage(place, fmt::format("an incomplete datagram of node {}: {}", lane.meaning.node,
-                            std::string_view(reason.data(), reason.size())));
+  damage(position, fmt::format("an incomplete datagram of node {}: {}", lane.meaning.node,
+                               std::string_view(reason.data(), reason.size())));
 }
 
 void BusRecords::on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
-                              const CanFrame& frame, const BusTransfers::Place& place) {
+                              const CanFrame& frame, const BusTransfers::LogPosition& position) {
   if (meaning.kind == CanIdKind::emergency_stop) {
-    return tell({time_of(place), no_path, RecordKind::event, "stop " + interface});
+    return tell({time_of(position), no_path, RecordKind::event, "stop " + interface});
   }
   if (meaning.kind == CanIdKind::watch) return;  // not from the board
   const std::uint8_t number = frame.size == 0 ? 0 : frame.data[0];
   const SafeReason reason = number == 0 ? SafeReason::fault : to_safe_reason(number);
   const std::string words = fmt::format("link safe {}", to_text(reason));
-  tell({time_of(place), path_of(interface, meaning.node), RecordKind::event, words});
+  tell({time_of(position), path_of(interface, meaning.node), RecordKind::event, words});
 }
 
 std::uint16_t BusRecords::path_of(const std::string& interface, std::uint8_t node) {
@@ -102,9 +102,9 @@ void BusRecords::tell(const Record& record) {
   visitor_.on_record(record);
 }
 
-void BusRecords::damage(const BusTransfers::Place& place, const std::string& reason) {
+void BusRecords::damage(const BusTransfers::LogPosition& position, const std::string& reason) {
   told_ = true;
-  visitor_.on_damage({RecordingDamage::Kind::line, place.line, place.offset, reason});
+  visitor_.on_damage({RecordingDamage::Kind::line, position.line, position.offset, reason});
 }
 
 }  // namespace r4::tool

@@ -24,9 +24,9 @@ class BusRecords final : BusTransfers::Handler {
  public:
   explicit BusRecords(RecordingVisitor& visitor) : visitor_(visitor) {}
 
-  // `place` must have a time. Ignores frames of other protocols.
+  // `position` must have a time. Ignores frames of other protocols.
   void on_frame(std::string_view interface, const CanFrame& frame,
-                const BusTransfers::Place& place);
+                const BusTransfers::LogPosition& position);
   void finish();
   bool told() const { return told_; }
   // Reports a path and returns its number. Call also for paths that are not on CAN.
@@ -34,13 +34,13 @@ class BusRecords final : BusTransfers::Handler {
 
  private:
   void on_datagram(const BusTransfers::Lane& lane) override;
-  void on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
+  void on_failure(const BusTransfers::Lane& lane, const BusTransfers::LogPosition& position,
                   IsotpError error) override;
   void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
-                    const CanFrame& frame, const BusTransfers::Place& place) override;
+                    const CanFrame& frame, const BusTransfers::LogPosition& position) override;
   std::uint16_t path_of(const std::string& interface, std::uint8_t node);
   void tell(const Record& record);
-  void damage(const BusTransfers::Place& place, const std::string& reason);
+  void damage(const BusTransfers::LogPosition& position, const std::string& reason);
 
   RecordingVisitor& visitor_;
   BusTransfers transfers_{*this};

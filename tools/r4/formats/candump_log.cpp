@@ -99,22 +99,22 @@ void CandumpSource::fail_as_none() const {
   fail("is not a log of CAN frames", "make a log: candump -L can0 > FILE");
 }
 
-std::optional<CandumpSink::Place> CandumpSink::place_of(const RecordedPath& path) {
+std::optional<CandumpSink::BusAddress> CandumpSink::bus_of(const RecordedPath& path) {
   try {
     const Url url = Url::parse(path.url);
     if (url.scheme() != "can" || url.host().empty()) return std::nullopt;
     const std::string interface = bus_interface(url.host());
     if (!is_interface_name(interface)) return std::nullopt;
-    return Place{interface, static_cast<std::uint8_t>(url.get_number("node", 0, 31, 1)),
-                 url.get_number("fd", 0, 1, 0) == 1, url.get_number("pack", 0, 1, 1) == 1};
+    return BusAddress{interface, static_cast<std::uint8_t>(url.get_number("node", 0, 31, 1)),
+                      url.get_number("fd", 0, 1, 0) == 1, url.get_number("pack", 0, 1, 1) == 1};
   } catch (const Error&) {
     return std::nullopt;
   }
 }
 
 void CandumpSink::on_path(const RecordedPath& path, Time) {
-  if (const auto place = place_of(path)) {
-    paths_.insert_or_assign(path.number, *place);
+  if (const auto bus = bus_of(path)) {
+    paths_.insert_or_assign(path.number, *bus);
   } else {
     paths_.erase(path.number);
     elsewhere_ = path.url;
@@ -129,11 +129,11 @@ void CandumpSink::on_record(const Record& record) {
 }
 
 // Simulates both ends of the bus. A datagram that does not arrive unchanged is not written.
-bool CandumpSink::write_frames(const Place& place, const Record& record) {
-  CanNode board(CanEnd::board, place.node, place.fd);
-  CanNode host(CanEnd::host, place.node, place.fd);
-  board.use_packed_form(place.packed);
-  host.use_packed_form(place.packed);
+bool CandumpSink::write_frames(const BusAddress& bus, const Record& record) {
+  CanNode board(CanEnd::board, bus.node, bus.fd);
+  CanNode host(CanEnd::host, bus.node, bus.fd);
+  board.use_packed_form(bus.packed);
+  host.use_packed_form(bus.packed);
   const bool from_board = record.kind == RecordKind::from_board;
   CanNode& sender = from_board ? board : host;
   CanNode& receiver = from_board ? host : board;
@@ -159,7 +159,7 @@ bool CandumpSink::write_frames(const Place& place, const Record& record) {
     arrived = arrived || (forth && whole == Text(record.bytes));
     const auto us = record.time.count();
     const auto out = std::back_inserter(text_);
-    fmt::format_to(out, "({}.{:06}) {} {:03X}#{}", us / 1'000'000, us % 1'000'000, place.interface,
+    fmt::format_to(out, "({}.{:06}) {} {:03X}#{}", us / 1'000'000, us % 1'000'000, bus.interface,
                    frame.id, frame.fd ? "#0" : "");
     for (std::size_t i = 0; i < frame.size; ++i) fmt::format_to(out, "{:02X}", frame.data[i]);
     text_ += '\n';

@@ -57,16 +57,16 @@ class CandumpSink final : public Sink {
   std::string left_out() const override;
 
  private:
-  struct Place {
+  struct BusAddress {
     std::string interface;
     std::uint8_t node;
     bool fd, packed;
   };
-  static std::optional<Place> place_of(const RecordedPath& path);
-  bool write_frames(const Place& place, const Record& record);
+  static std::optional<BusAddress> bus_of(const RecordedPath& path);
+  bool write_frames(const BusAddress& bus, const Record& record);
 
   Output& output_;
-  std::map<std::uint16_t, Place> paths_;
+  std::map<std::uint16_t, BusAddress> paths_;
   std::string elsewhere_;  // URL of a path that is not a CAN bus
   std::string text_;
   std::uint64_t written_ = 0;

@@ -101,22 +101,23 @@ dds_entity_t Graph::topic(std::size_t node, const std::string& name, const Messa
       .get();
 }
 
-dds_entity_t Graph::add(EndpointKind kind, const Place& place, const MessageType& type, Qos qos) {
+dds_entity_t Graph::add(EndpointKind kind, const EndpointName& name, const MessageType& type,
+                        Qos qos) {
   qos.user_data += user_data_of(type);
   const QosPtr made = make_qos(qos);
-  Member& member = members_[place.node / nodes_a_participant];
+  Member& member = members_[name.node / nodes_a_participant];
   const auto create = kind == EndpointKind::reader ? dds_create_reader : dds_create_writer;
   const dds_entity_t endpoint =
       endpoints_
-          .emplace_back(create(member.participant.get(), topic(place.node, place.topic, type),
+          .emplace_back(create(member.participant.get(), topic(name.node, name.topic, type),
                                made.get(), nullptr),
-                        place.topic)
+                        name.topic)
           .get();
-  Node& node = nodes_[place.node];
+  Node& node = nodes_[name.node];
   (kind == EndpointKind::reader ? node.readers : node.writers).push_back(id_of(endpoint));
-  own_[place.topic].endpoints.push_back({kind, place.node, place.name, type.descriptor->m_typename,
-                                         policies_of(kind, made.get()), !member.listing});
-  if (member.listing) member.listing->change(place.node % nodes_a_participant, node);
+  own_[name.topic].endpoints.push_back({kind, name.node, name.name, type.descriptor->m_typename,
+                                        policies_of(kind, made.get()), !member.listing});
+  if (member.listing) member.listing->change(name.node % nodes_a_participant, node);
   return endpoint;
 }
 

@@ -99,12 +99,12 @@ class Graph {
   Service make_service(std::size_t node, std::string_view name, const char* type,
                        const MessageType& request, const MessageType& response);
   dds_entity_t topic(std::size_t node, const std::string& name, const MessageType& type);
-  struct Place {
+  struct EndpointName {
     std::size_t node;
     std::string name;
     std::string topic;
   };
-  dds_entity_t add(EndpointKind kind, const Place& place, const MessageType& type, Qos qos);
+  dds_entity_t add(EndpointKind kind, const EndpointName& name, const MessageType& type, Qos qos);
   void add_participant();
 
   struct Member {
