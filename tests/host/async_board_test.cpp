@@ -6,11 +6,8 @@
 
 #include <algorithm>
 #include <asio/bind_executor.hpp>
-#include <asio/co_spawn.hpp>
-#include <asio/steady_timer.hpp>
 #include <asio/strand.hpp>
 #include <asio/thread_pool.hpp>
-#include <asio/use_awaitable.hpp>
 #include <optional>
 #include <thread>
 
@@ -69,14 +66,6 @@ struct Bus final : IdleCarrier {
   bool is_shared() const override { return true; }
   std::vector<std::string>& sent;
 };
-
-TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
-  std::vector<std::string> sent;
-  AsyncBoard controlling(io, std::make_unique<Bus>(sent), at_will());
-  controlling.open();
-  ASSERT_FALSE(sent.empty());
-  EXPECT_EQ(sent[0].substr(0, 9), "H:ROS2-R4");
-}
 
 TEST_F(AsyncBoardTest, AWatcherOnABusSendsOnlyLeasesAndStopsWithAnyTimeout) {
   std::vector<std::string> sent;
@@ -146,32 +135,6 @@ TEST_F(AsyncBoardTest, GivesEverySubscriberTheNewestCause) {
   EXPECT_EQ(told.back(), DisarmCause::stop) << "the first board object has stopped the board";
 }
 
-TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {
-  std::vector<Outcome> outcomes;
-  auto program = [&]() -> asio::awaitable<void> {
-    board.open();
-    CommandResult result = co_await board.async_send(Command::identify(), 1s, asio::use_awaitable);
-    outcomes.push_back(result.outcome);
-    EXPECT_EQ(board.identity().board_id, "sim-1");
-    for (int i = 0; i < 3; ++i) {
-      result = co_await board.async_send(Command::servo(1, Microseconds(1500 + i)), 1s,
-                                         asio::use_awaitable);
-      outcomes.push_back(result.outcome);
-    }
-    result = co_await board.async_send(Command::stop(), 1s, asio::use_awaitable);
-    outcomes.push_back(result.outcome);
-    result = co_await board.async_send(start_motor, 1s, asio::use_awaitable);
-    outcomes.push_back(result.outcome);
-    EXPECT_EQ(result.code, Refusal::safe);
-    board.close();
-  };
-  asio::co_spawn(io, program(), [](std::exception_ptr e) { EXPECT_FALSE(e); });
-  io.run();
-  EXPECT_EQ(outcomes,
-            (std::vector<Outcome>{Outcome::confirmed, Outcome::confirmed, Outcome::confirmed,
-                                  Outcome::confirmed, Outcome::confirmed, Outcome::refused}));
-}
-
 TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
   asio::thread_pool pool(1);
   std::atomic<bool> done{false};
@@ -196,6 +159,13 @@ TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
   io.restart();
   io.run();
   EXPECT_TRUE(inside);
+}
+
+TEST_F(AsyncBoardTest, AWaitForAnActiveBoardEndsAtItsDeadline) {
+  AsyncBoard silent(io, "udp://127.0.0.1:9?listen=0");
+  silent.open();
+  const auto wait = [&](auto end) { silent.async_wait_active(20ms, end); };
+  EXPECT_EQ(result_of(wait).outcome, Outcome::timed_out);
 }
 
 TEST_F(AsyncBoardTest, RefusesTheSixtyFifthCommand) {
@@ -303,19 +273,6 @@ TEST(AsyncBoardEnd, MayBeClosedOrDestroyedInAnEventOfOpen) {
   io.run();  // returns: no timer is left
 }
 
-TEST(AsyncBoardEnd, MayBeDestroyedBeforeItsLoopRuns) {
-  asio::io_context io;
-  bool called = false;
-  {
-    AsyncBoard board(io, "sim:", at_will());
-    board.open();
-    board.async_send(start_motor, 1s, [&](const CommandResult&) { called = true; });
-  }
-  EXPECT_FALSE(called);
-  io.run();
-  EXPECT_TRUE(called);
-}
-
 TEST(AsyncBoardEnd, DestroyingTheLoopDestroysTheHandlers) {
   const auto payload = std::make_shared<int>(1);
   {
@@ -326,19 +283,6 @@ TEST(AsyncBoardEnd, DestroyingTheLoopDestroysTheHandlers) {
     io.poll();
   }
   EXPECT_EQ(payload.use_count(), 1);
-}
-
-TEST_F(AsyncBoardTest, WatchdogHoldsHeartbeatsAndAnyThreadMayFeed) {
-  board.watchdog(30ms);
-  board.open();
-  ASSERT_TRUE(run_until([&] { return board.link().gated(); }));
-  std::atomic<bool> stop{false};
-  std::thread feeder([&] {
-    while (!stop) board.feed();
-  });
-  EXPECT_TRUE(run_until([&] { return !board.link().gated() && board.in_control(); }));
-  stop = true;
-  feeder.join();
 }
 
 }  // namespace

@@ -84,24 +84,6 @@ TEST(BoardArming, NamesTheCauseThatPreventsArming) {
             arming.reason);
 }
 
-TEST(BoardArming, ArmsABoardThatIsStopped) {
-  Board board("sim:");
-  board.wait_active();
-  board.stop();
-  board.arm();
-  EXPECT_EQ(board.next_state().relays & 1, 1);
-  board.osmc(1).set_pwm(358, Direction::forward);
-}
-
-TEST(BoardArming, ArmDoesNotExecuteEarlierSetpoints) {
-  Board board("sim:", at_will());
-  board.wait_active();
-  board.osmc(1).set_pwm(500, Direction::forward);  // as if the network had delayed the datagram
-  EXPECT_EQ(driven(board), 500);
-  board.arm();
-  EXPECT_EQ(driven(board), 0);
-}
-
 TEST(BoardArming, CountsRefusedPostsAndReportsThoseTheBoardRefuses) {
   BoardInAThread simulated("pty");
   Board guarded(simulated.url(), at_will());

@@ -1,28 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Groups of commands from end to end: r4::Board and r4::AsyncBoard with simulated boards, and the
-// times at which the registers of the chips change.
+// Groups of commands from end to end: r4::Board with simulated boards, and the times at which the
+// registers of the chips change.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "firmware/ports/sim/simulated_board.hpp"
-#include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
 #include "r4link/error.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/driven_board.hpp"
-#include "tests/support/on_a_loop.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
 namespace {
-
-using namespace std::chrono_literals;
 
 constexpr Direction forward = Direction::forward;
 
@@ -125,20 +120,6 @@ TEST_F(DrivenGroup, IsConfirmedOrRefusedAsAWhole) {
   EXPECT_TRUE(contains(refused.reason, "none of the 2 commands was executed"));
   EXPECT_EQ(problem_of([&] { board.send(Setpoints{}); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { board.send("O:5,1,1;E:CLEAR"); }).kind, ErrorKind::usage);
-  EXPECT_EQ(
-      problem_of([&] { board.send(Setpoints{Command::servo(1, Microseconds(1))}, 0ms); }).kind,
-      ErrorKind::usage);
-}
-
-TEST(AsyncBoardGroup, IsRefusedIfItIsEmptyAndEndsIfTheBoardIsClosed) {
-  OnALoop loop;
-  AsyncBoard board(loop.io, "sim:", at_will());
-  EXPECT_THROW(board.async_send(Setpoints{}, 1s, [](const CommandResult&) {}), Error);
-  EXPECT_THROW(board.post(Setpoints{}), Error);
-  const auto apply = [&](auto end) {
-    board.async_send(Setpoints{Command::servo(1, Microseconds(1))}, 1s, end);
-  };
-  EXPECT_EQ(loop.result_of(apply).outcome, Outcome::closed);
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
@@ -13,7 +12,6 @@
 #include <optional>
 #include <random>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "host/state_queue.hpp"
@@ -81,15 +79,6 @@ TEST(BoardStates, EndWithTheBoardAndMayBeUsedAfterIt) {
   board.reset();
   EXPECT_TRUE(states.ended());
   EXPECT_FALSE(states.take(60s));
-}
-
-TEST(BoardStates, AnExceptionOfOnWaitEndsTheWait) {
-  struct EnoughWaited {};
-  BoardOptions options;
-  options.on_wait = [] { throw EnoughWaited(); };
-  Board board("udp://127.0.0.1:9?listen=0", options);
-  States states = board.states();
-  EXPECT_THROW(states.take(60s), EnoughWaited);
 }
 
 // Compares with a deque, for any order of puts and takes.

@@ -11,6 +11,7 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -73,10 +74,12 @@ TEST_F(BoardThread, NeverSendsACommandAfterItsCallHasThrown) {
 
 TEST_F(BoardThread, AnExceptionOfOnWaitEndsTheCallAndNothingIsSent) {
   hold_up();
+  States states = board.states();
   enough = true;
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_THROW(board.send("O:777,1,1", 5s), Enough);
   EXPECT_THROW(board.next_state(5s), Enough);
+  EXPECT_THROW(states.take(5s), Enough);
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
   enough = false;
   hold.release();
@@ -97,10 +100,6 @@ TEST(BoardName, IsNeverTornWhileTheTransportReopens) {
   const std::string path = "/tmp/r4-board-name-" + std::to_string(::getpid());
   auto simulated = std::make_unique<BoardInAThread>("pty:" + path);
   Board board("serial://" + path);
-  board.watchdog(1ms);  // never fed, so that no wait ends
-  auto waiting =
-      std::async(std::launch::async, [&] { return problem_of([&] { board.wait_active(60s); }); });
-  ASSERT_EQ(waiting.wait_for(50ms), std::future_status::timeout);
   const std::string name = board.name();
   EXPECT_EQ(name, "serial://" + path);
   std::atomic<bool> up{true};
@@ -124,40 +123,11 @@ TEST(BoardName, IsNeverTornWhileTheTransportReopens) {
   done = true;
   asking.get();
   board.close();
-  EXPECT_EQ(waiting.get().thing, name);
 }
 
 // --- callbacks
 
-TEST(BoardCallbacks, OnEventIsCalledFirstWithTheUpEvent) {
-  for (int i = 0; i < 20; ++i) {
-    Board board("sim:");
-    const First<CarrierEvent::Kind> first;
-    board.on_event([first](const CarrierEvent& event) { first.set(event.kind); });
-    EXPECT_EQ(first.get(), CarrierEvent::Kind::up);
-  }
-}
-
-// Each board has a separate loop and thread, but hosts listen on one port.
-TEST(TwoBoards, InOneProgramShareThePortAndGetTheirOwnDatagrams) {
-  BoardInAThread left("udp");
-  BoardInAThread right("udp");
-  Board first(left.url());
-  first.wait_active();
-  const std::string listen = first.name().substr(first.name().find('?'));
-  Board second(right.url().substr(0, right.url().find('?')) + listen);
-  second.wait_active();
-  first.send("C:rate,50");
-  second.send("C:rate,20");
-  EXPECT_EQ(left.executed().back(), "C:rate,50");
-  EXPECT_EQ(right.executed().back(), "C:rate,20");
-  first.stop();
-  EXPECT_EQ(second.state().safe, SafeReason::none);
-  EXPECT_EQ(problem_of([&] { Board again(first.name()); }).reason,
-            "this program has already opened that board");
-}
-
-TEST(BoardCallbacks, ANewCallbackGetsTheLinkAndNewestStateOfASilentBoard) {
+TEST(BoardCallbacks, ANewCallbackGetsTheNewestEventLinkAndStateOfASilentBoard) {
   BoardInAThread simulated("udp");
   BoardOptions options;
   options.session.timing.timeout_ms = 50;
@@ -175,6 +145,9 @@ TEST(BoardCallbacks, ANewCallbackGetsTheLinkAndNewestStateOfASilentBoard) {
   const First<std::uint32_t> state;
   board.on_state([state](const State& newest) { state.set(newest.t_ms); });
   EXPECT_EQ(state.get(), board.state().t_ms);
+  const First<CarrierEvent::Kind> event;
+  board.on_event([event](const CarrierEvent& newest) { event.set(newest.kind); });
+  EXPECT_EQ(event.get(), CarrierEvent::Kind::up);
 }
 
 TEST(BoardCallbacks, OnStateIsNotCalledBeforeTheFirstState) {
@@ -348,38 +321,19 @@ TEST(BoardCallbacks, ALateCallbackGetsTheNewestState) {
   EXPECT_GE(next.get(), newest);
 }
 
-struct BoardLoop : DrivenBoard {
-  // Waits for the outcome of the call that `start(board, handler)` begins on the loop.
-  template <class Start>
-  std::future<Outcome> begin(Start start) {
-    const auto ended = std::make_shared<std::promise<Outcome>>();
-    EXPECT_TRUE(board.post_to_loop([start, ended](AsyncBoard& async) {
-      start(async, [ended](const CommandResult& result) { ended->set_value(result.outcome); });
-    }));
-    return ended->get_future();
-  }
-};
-
-TEST_F(BoardLoop, RunsAsyncBoardCallsWithoutBlockingTheCaller) {
-  board.arm();
-  const auto set = [](AsyncBoard& async, auto end) {
-    async.async_send(Command::osmc(1, Pwm(100), Direction::forward), 1s, std::move(end));
-  };
-  EXPECT_EQ(begin(set).get(), Outcome::confirmed);
-  EXPECT_EQ(board.state().raw.osmc[0].pwm, 100);
-}
+struct BoardLoop : DrivenBoard {};
 
 TEST_F(BoardLoop, EndsPendingCallsAsClosedAndAcceptsNoMore) {
   board.release_control();
   simulated.switch_off();
-  std::future<Outcome> late = begin([](AsyncBoard& async, auto end) {
+  std::optional<Outcome> late;
+  EXPECT_TRUE(board.post_to_loop([&](AsyncBoard& async) {
     async.take_control();
-    async.async_wait_active(1h, std::move(end));
-  });
+    async.async_wait_active(1h, [&](const CommandResult& result) { late = result.outcome; });
+  }));
   while (board.role() != BoardRole::control) std::this_thread::yield();
   board.close();
-  ASSERT_EQ(late.wait_for(0s), std::future_status::ready);
-  EXPECT_EQ(late.get(), Outcome::closed);
+  EXPECT_EQ(late, Outcome::closed);
   EXPECT_FALSE(board.post_to_loop([](AsyncBoard&) { ADD_FAILURE() << "the board is closed"; }));
 }
 

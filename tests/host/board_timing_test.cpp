@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The timeout and the heartbeat interval of a board are set together. After wait_active() the
-// program has control.
+// The timeout and the heartbeat interval of a board are set together.
 #include <gtest/gtest.h>
 
-#include <optional>
-
-#include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
 #include "tests/support/board_in_a_thread.hpp"
-#include "tests/support/on_a_loop.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -57,35 +52,6 @@ TEST(BoardTiming, RefusesImpossibleTimesBeforeSendingAnything) {
   EXPECT_EQ(slow.kind, ErrorKind::usage);
   EXPECT_TRUE(contains(slow.reason, "this program sends a heartbeat"));
   EXPECT_TRUE(contains(slow.fix, "heartbeat_ms"));
-}
-
-struct AsyncBoardActive : testing::Test, OnALoop {};
-
-TEST_F(AsyncBoardActive, SendsAPostMadeAsSoonAsTheBoardIsActive) {
-  BoardInAThread simulated("udp");
-  AsyncBoard board(io, simulated.url());
-  board.open();
-  std::optional<PostResult> posted;
-  board.async_wait_active(5s, [&](const CommandResult& result) {
-    EXPECT_EQ(result.outcome, Outcome::confirmed);
-    posted = board.post(Command::setting("rate", "50"));
-  });
-  ASSERT_TRUE(run_until([&] { return posted.has_value(); }));
-  EXPECT_TRUE(*posted);
-}
-
-TEST_F(AsyncBoardActive, EndsAtItsDeadlineOrWithTheBoard) {
-  AsyncBoard board(io, "udp://127.0.0.1:9?listen=0");
-  board.open();
-  const auto begin = std::chrono::steady_clock::now();
-  std::optional<CommandResult> closed;
-  board.async_wait_active(5s, [&](const CommandResult& result) { closed = result; });
-  const auto wait = [&](auto end) { board.async_wait_active(20ms, end); };
-  EXPECT_EQ(result_of(wait).outcome, Outcome::timed_out);
-  board.close();
-  ASSERT_TRUE(run_until([&] { return closed.has_value(); }));
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, 4s);
-  EXPECT_EQ(closed->outcome, Outcome::closed);
 }
 
 }  // namespace

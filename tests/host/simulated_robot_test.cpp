@@ -130,12 +130,5 @@ TEST(SimulatedRobot, ReportsInvalidEventsAndUrls) {
                              "no such SimulatedRobot"));
 }
 
-TEST(BadLink, RefusesInvalidImpairments) {
-  for (const char* link : {"", "loss", "loss=120%", "speed=3"}) {
-    EXPECT_EQ(test::problem_of([&] { sim::with_link("sim:", link); }).kind, ErrorKind::usage)
-        << link;
-  }
-}
-
 }  // namespace
 }  // namespace r4

@@ -86,12 +86,6 @@ TEST(Fleet, StopsAllBoardsUntilTheyAreCleared) {
   ActiveFleet fleet({"sim:?node=0-7"}, at_will());
   fleet.send(Command::osmc(1, Pwm(500), Direction::forward)).require();
   EXPECT_TRUE(fleet.stop().all_confirmed());
-  EXPECT_TRUE(comes([&] {
-    for (const ReceivedState& state : fleet.states()) {
-      if (state.safe != SafeReason::stop || state.osmc(1).pwm != 0) return false;
-    }
-    return true;
-  }));
   EXPECT_EQ(fleet.send("O:1,1,1").failed().size(), 8U);
   fleet.send(Command::clear()).require();
   fleet.send("O:1,1,1").require();
@@ -191,7 +185,6 @@ TEST(Fleet, RefusesInvalidUrlsBoardsAndCommands) {
   EXPECT_EQ(problem({}).kind, ErrorKind::usage);
   EXPECT_EQ(problem({"sim:?node=0-3", "sim:?node=2"}).text(),
             "sim:?node=2: the board is named twice; name each board once");
-  EXPECT_EQ(problem({"udp://10.0.0.{1-"}).kind, ErrorKind::usage);
   EXPECT_EQ(problem({"sim:", "serial:///dev/no-such-port"}).kind, ErrorKind::open);
   Fleet fleet({"sim:?node=0-1"});
   EXPECT_EQ(problem_of([&] { fleet.send({2}, "O:1,1,1"); }).text(),
@@ -226,14 +219,12 @@ TEST(Fleet, EndsACallWithTheExceptionOfOnWait) {
 }
 
 TEST(Fleet, RecordsAllBoardsInOneFile) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "fleet_test.r4log";
+  const std::string path = testing::TempDir() + "fleet_test.r4log";
   {
-    Recording recording(path.string());
+    Recording recording(path);
     Fleet fleet({"sim:?node=0-3"});
     fleet.record(recording);
     ASSERT_EQ(fleet.wait_active(), Boards{});
-    fleet.close();
-    recording.close();
   }
   struct Paths final : RecordingVisitor {
     std::set<int> paths;
@@ -243,7 +234,7 @@ TEST(Fleet, RecordsAllBoardsInOneFile) {
     }
     void on_damage(const RecordingDamage& damage) override { ADD_FAILURE() << damage.reason; }
   } read;
-  read_recording(path.string(), read);
+  read_recording(path, read);
   EXPECT_EQ(read.paths.size(), 4U);
   std::filesystem::remove(path);
 }

@@ -122,7 +122,7 @@ void RobotOnPaths::plug(std::size_t path, bool in) {
   }
 }
 
-void RobotOnPaths::reboot(std::size_t board, std::uint32_t t_ms) { boards_[board]->boot(t_ms); }
+void RobotOnPaths::reboot(std::size_t board) { boards_[board]->boot(50); }
 
 void RobotOnPaths::bring(std::size_t path, std::string_view bytes) {
   session->receive(path, bytes, now());

@@ -52,8 +52,8 @@ class RobotOnPaths final : private DrivenSession::Handler {
   void cut(std::size_t path, bool is_cut = true);
   // Connects or disconnects the path. The transport reports the change.
   void plug(std::size_t path, bool in);
-  // The board restarts, and its clock begins at `t_ms`.
-  void reboot(std::size_t board, std::uint32_t t_ms = 50);
+  // The board restarts, and its clock begins at 50 ms.
+  void reboot(std::size_t board);
   // Delivers a datagram to the host as if the datagram arrived over that path.
   void bring(std::size_t path, std::string_view bytes);
   CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);

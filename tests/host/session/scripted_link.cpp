@@ -73,6 +73,13 @@ void ScriptedLink::executed(std::uint32_t pnum) {
   state("AIN24:24.28;SAFE:0;CMD:" + std::to_string(pnum) + ";");
 }
 
+void ScriptedLink::send_states(int count, std::string_view fields) {
+  for (; count != 0; --count) {
+    pass(std::chrono::milliseconds{10});
+    state(fields);
+  }
+}
+
 void ScriptedLink::nack(std::uint32_t pnum, std::string_view code) {
   const std::string began =
       session_pnum == 0 ? "" : "SESSION:" + std::to_string(session_pnum) + ";";

@@ -65,7 +65,8 @@ class ScriptedLink : private DrivenSession::Handler {
   void stopped(std::uint32_t stop, int cause = 1);  // SAFE:2 after the E:STOP with this number
   // Fields such as "AIN24:24.28;CMD:7;". The safe reason is a field of `fields`.
   void state(std::string_view fields);
-  void executed(std::uint32_t pnum);  // a state with SAFE 0 and this CMD
+  void executed(std::uint32_t pnum);                     // a state with SAFE 0 and this CMD
+  void send_states(int count, std::string_view fields);  // one state every 10 ms
   // Addresses the host of the session that began with heartbeat session_pnum. 0: another host.
   void nack(std::uint32_t pnum, std::string_view code);
   std::uint32_t session_pnum = 0;       // set by connect()

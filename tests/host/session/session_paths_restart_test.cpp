@@ -5,7 +5,6 @@
 
 #include "robot_on_paths.hpp"
 #include "tests/support/datagrams.hpp"
-#include "tests/support/signing.hpp"
 
 namespace r4::test {
 namespace {
@@ -29,24 +28,6 @@ TEST(SessionPaths, ReportARestartOnceAndCarryAgain) {
     }
     EXPECT_EQ(robot.drive(2).outcome, Outcome::confirmed);
   }
-}
-
-TEST(SessionPaths, SurviveALateHeartbeatOfABootingBoard) {
-  SessionOptions options = RobotOnPaths::at_will();
-  options.key = key_of(1);
-  options.clock_start = std::chrono::hours{1};
-  RobotOnPaths robot(Cables{{1}, {1}}, options, BoardRole::control, settings_with(key_of(1)));
-  robot.connect();
-  robot.links.clear();
-  const std::string t = std::to_string(robot.board_ms(0) - 600);
-  const std::string board_nonce = str(robot.board(0).authentication().nonce());
-  const std::string booting = with_crc("H:R4-ROS2;PNum:0;T:" + t + ";AN:" + board_nonce + ";");
-  robot.bring(0, booting);
-  robot.bring(1, booting);
-  robot.run(1500);
-  for (const LinkStatus& each : robot.links) EXPECT_TRUE(is_heard(each.state));
-  EXPECT_EQ(robot.trips, 0);
-  EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
 }
 
 TEST(SessionPaths, ALateBootHeartbeatDoesNotEndTheSession) {

@@ -109,7 +109,7 @@ TEST_F(SessionRole, AChangeOfRoleCancelsEarlierCommands) {
   EXPECT_EQ(link.count('O') + link.count('F') + link.count('R'), 0U);
 }
 
-TEST_F(SessionRole, AStopContinuesOverEveryChange) {
+TEST_F(SessionRole, AStopContinuesOverEveryChangeAndAfterLeaving) {
   link.state("SAFE:0;");
   const Ticket ticket = link.session.send(Command::stop(), 10s, link.now);
   const std::uint32_t pnum = link.last('E').pnum;
@@ -121,27 +121,26 @@ TEST_F(SessionRole, AStopContinuesOverEveryChange) {
     EXPECT_EQ(link.last('E').pnum, pnum);
     EXPECT_EQ(link.last('E').priority, Priority::stop);
   }
+  link.session.leave(100ms, link.now);
+  link.sent.clear();
+  link.pass(100ms);
+  EXPECT_GE(link.count('E'), 4U);
   link.stopped(pnum);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
 
-TEST_F(SessionRole, HeldHeartbeatsStayHeldOverAChange) {
-  link.session.hold(true, link.now);
-  change(BoardRole::control);
-  link.pass(500ms);
-  EXPECT_EQ(link.count('H'), 0U);
-  EXPECT_TRUE(link.session.link().causes.has(LinkCause::callback));
-  link.session.hold(false, link.now);
-  link.pass(1ms);
-  EXPECT_EQ(link.count('H'), 1U);
-}
-
-TEST_F(SessionRole, AnExpiredWatchdogHoldsTheHeartbeatsUntilItIsFed) {
+TEST_F(SessionRole, HeartbeatsStayHeldOverAChangeUntilHoldAndWatchdogEnd) {
   link.session.watchdog(50ms, link.now);
+  link.session.hold(true, link.now);
   link.pass(200ms);
   EXPECT_FALSE(link.session.link().gated()) << "a watcher sends no heartbeats";
   change(BoardRole::control);
-  link.pass(200ms);
+  EXPECT_EQ(link.session.link().causes, (LinkCauses{LinkCause::watchdog, LinkCause::callback}));
+  link.session.feed(link.now);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::callback);
+  link.pass(500ms);
+  link.session.hold(false, link.now);
+  link.pass(500ms);
   EXPECT_EQ(link.count('H'), 0U);
   link.session.feed(link.now);
   link.pass(1ms);

@@ -31,11 +31,14 @@ TEST_F(NewSession, ReportsTheAgeOfTheStateEvenWhileTheLinkIsLost) {
   EXPECT_EQ(age(link), 5s);
 }
 
-TEST_F(SessionState, TakesTheSafeReasonFromHeartbeatsWithoutStates) {
+TEST_F(SessionState, StaysOverAnOutageAndTakesTheSafeReasonFromHeartbeats) {
   link.state("ENC1:7;SAFE:0;CMD:1;");
   const auto received = link.session.state().received;
-  link.pass(1500ms);
+  link.pass(60s);
   link.heartbeat(SafeReason::link);
+  EXPECT_EQ(link.session.link(),
+            (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::link, .carrying = 1}));
+  EXPECT_EQ(link.restarts, 0);
   EXPECT_EQ(link.session.state().safe, SafeReason::link);
   EXPECT_EQ(link.session.state().encoder(1), 7);
   EXPECT_EQ(link.session.state().received, received) << "a heartbeat is not a state";
@@ -47,8 +50,9 @@ TEST_F(SessionState, NamesTheFieldsReportedSinceTheBoardStarted) {
   const auto reported = [this](StateField field) {
     return link.session.state().reported.has(field);
   };
-  link.state("ENC1:7;SAFE:0;CMD:1;");
+  link.state("ENC1:7;SAFE:2;CMD:1;");
   link.state("OSMC1:358,1;");  // another part of a state that needs several datagrams
+  EXPECT_EQ(link.session.link().reason, SafeReason::none) << "the newest state has no SAFE";
   EXPECT_TRUE(reported(StateField::enc1) && reported(StateField::osmc1));
   EXPECT_FALSE(link.session.state().present.has(StateField::enc1));
   EXPECT_FALSE(reported(StateField::enc2));
@@ -88,6 +92,7 @@ TEST_F(SessionState, IsClearedByARestartOfTheBoard) {
     }
     each.state(by_heartbeat ? "ENC2:5;" : "ENC2:5;SAFE:3;");
     EXPECT_EQ(each.restarts, 1) << by_heartbeat;
+    EXPECT_EQ(each.session.packets().lost, 0U) << "numbers that begin anew are not a loss";
     const ReceivedState& state = each.states.back();
     EXPECT_EQ(state.encoder(2), 5) << by_heartbeat;
     EXPECT_EQ(state.encoder(1), 0) << by_heartbeat;
@@ -95,19 +100,6 @@ TEST_F(SessionState, IsClearedByARestartOfTheBoard) {
     EXPECT_FALSE(state.fault.any()) << by_heartbeat;
     EXPECT_EQ(state.safe, by_heartbeat ? SafeReason::none : SafeReason::handle);
   }
-}
-
-TEST_F(SessionState, StaysOverAnOutage) {
-  link.state("ENC1:7;SAFE:0;CMD:1;");
-  link.pass(60s);
-  link.heartbeat(SafeReason::link);
-  EXPECT_EQ(link.session.link(),
-            (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::link, .carrying = 1}));
-  link.pass(10ms);
-  link.executed(1);
-  EXPECT_EQ(link.session.link().state, HostLinkState::active);
-  EXPECT_EQ(link.restarts, 0);
-  EXPECT_EQ(link.session.state().encoder(1), 7);
 }
 
 TEST_F(SessionState, KeepsTheSafeReasonOfAHeartbeatThatOvertookIt) {

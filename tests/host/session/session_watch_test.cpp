@@ -13,13 +13,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct SessionWatch : testing::Test {
+struct SessionWatch : NewSession {
+  SessionWatch() : NewSession(ScriptedLink::without_questions(), BoardRole::watch) {}
   // The board answers a W that does not echo a valid token.
   void tell(std::uint32_t token) {
     link.nack(link.last('W').pnum, "STALE;LEASE:" + std::to_string(token));
   }
-
-  ScriptedLink link{ScriptedLink::without_questions(), BoardRole::watch};
 };
 
 TEST_F(SessionWatch, AsksForALeaseTwiceASecondAndSendsNothingElse) {
@@ -63,8 +62,7 @@ TEST_F(SessionWatch, ABoardWithoutAHostConfirmsAStopOfAWatcher) {
   const Ticket ticket = link.session.send(Command::stop(), 1s, link.now);
   link.raw(with_crc(
       "H:R4-ROS2;PNum:0;T:0;SAFE:2;CAUSE:1;STOP:" + std::to_string(link.last('E').pnum) + ";"));
-  ASSERT_EQ(link.results.count(ticket), 1U);
-  EXPECT_EQ(link.results[ticket].outcome, Outcome::confirmed);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
 
 TEST_F(SessionWatch, IsActiveButNeverInControl) {

@@ -66,20 +66,6 @@ TEST_F(SessionHold, HoldsHeartbeatsAndCommandsButSendsStops) {
   EXPECT_GE(link.count('E'), 4U) << "a stop must always be sent";
 }
 
-TEST_F(SessionHold, HeartbeatsResumeAfterBothHoldAndWatchdogEnd) {
-  link.session.watchdog(100ms, link.now);
-  link.session.hold(true, link.now);
-  link.pass(200ms);
-  EXPECT_EQ(link.session.link().causes, (LinkCauses{LinkCause::watchdog, LinkCause::callback}));
-  link.session.hold(false, link.now);
-  EXPECT_TRUE(link.session.link().gated());
-  link.session.hold(true, link.now);
-  link.session.feed(link.now);
-  EXPECT_EQ(link.session.link().cause(), LinkCause::callback);
-  link.session.hold(false, link.now);
-  EXPECT_FALSE(link.session.link().gated());
-}
-
 TEST_F(SessionLink, SendsNoCommandAfterItsDeadline) {
   link.place_taken = true;
   link.session.post(Command::servo(1, Microseconds(1500)), link.now);

@@ -56,13 +56,6 @@ TEST(BoardSearch, ReportsTheAnswerAndTheAddressOfEachBoard) {
                                       "one at 127.0.0.2 left busy", "two at 127.0.0.3  free"}));
 }
 
-TEST(BoardSearch, FindsABoardAfterTwoLostQuestions) {
-  AnsweringBoards boards;
-  boards.add("0.2", {identity("late")}, 3);
-  EXPECT_EQ(ids(boards.search().run()), std::vector<std::string>{"late"});
-  EXPECT_EQ(boards.asked("0.2"), 3);
-}
-
 TEST(BoardSearch, SendsOnlyTheIdentityQuestion) {
   asio::io_context io;
   asio::ip::udp::socket socket(io, {asio::ip::make_address("127.0.0.2"), 0});
