@@ -36,6 +36,6 @@ client.on('message', ({ subscriptionId, timestamp, data }) => {
   const topic = topics.get(subscriptionId);
   messages[topic].push([String(timestamp), JSON.parse(new TextDecoder().decode(data))]);
   const records = [...channels.values()].find((channel) => channel.schemaName === 'r4.Record').topic;
-  if (messages[records].length !== count) return;
+  if (topic !== records || messages[records].length !== count) return;
   process.stdout.write(JSON.stringify({ channels: [...channels.values()], messages }), () => process.exit(0));
 });

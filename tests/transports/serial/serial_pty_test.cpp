@@ -125,7 +125,7 @@ TEST_F(SerialPtyTest, CarriesBothWays) {
   EXPECT_EQ(at_board.count(Kind::up), 1U);
   for (int i = 0; i < 50; ++i) {
     EXPECT_EQ(host->send("command " + std::to_string(i), Priority::normal), SendResult::sent);
-    EXPECT_EQ(board->send("state " + std::to_string(i), Priority::state), SendResult::sent);
+    EXPECT_EQ(board->send("state " + std::to_string(i), Priority::normal), SendResult::sent);
   }
   ASSERT_TRUE(wait_for(at_board, "command 49"));
   ASSERT_TRUE(wait_for(at_host, "state 49"));
