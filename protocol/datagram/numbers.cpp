@@ -7,17 +7,13 @@ namespace {
 constexpr std::uint64_t u32_max = 0xFFFFFFFFU;
 constexpr std::uint64_t u64_max = ~std::uint64_t{0};
 
-// The digit's value; above 9 if `c` is not a digit.
-constexpr unsigned digit_of(char c) { return unsigned{static_cast<unsigned char>(c)} - '0'; }
-constexpr bool is_digit(char c) { return digit_of(c) <= 9; }
-
 // One to nine digits always fit, and need no 64-bit arithmetic.
 constexpr bool fits_32_bits(std::size_t digits) { return digits - 1 < 9; }
 
 inline bool parse_short(const char* at, const char* end, std::uint32_t& out) {
   std::uint32_t value = 0;
   do {
-    const unsigned digit = digit_of(*at);
+    const unsigned digit = digit_value(*at);
     if (digit > 9) return false;
     value = value * 10 + digit;
   } while (++at != end);
@@ -38,7 +34,7 @@ inline bool parse_digits(const char* at, const char* end, std::uint64_t limit, s
     value = std::uint64_t{high} * e9 + low;
   } else {
     do {
-      const unsigned digit = digit_of(*at);
+      const unsigned digit = digit_value(*at);
       if (digit > 9 || value > (u64_max - digit) / 10) return false;
       value = value * 10 + digit;
     } while (++at != end);
@@ -148,36 +144,19 @@ bool is_whole_number(Text text) {
   skip_minus(text, at);
   if (at == text.end()) return false;
   for (; at != text.end(); ++at) {
-    if (!is_digit(*at)) return false;
+    if (!is_decimal_digit(*at)) return false;
   }
   return true;
 }
 
 bool parse_hundredths(Text text, std::int32_t& out) {
-  constexpr std::uint32_t max_units = 19999999;
-  const char* at = nullptr;
-  const bool negative = skip_minus(text, at);
-  const char* const end = text.end();
-  if (at == end) return false;
-  std::uint32_t units = digit_of(*at);
-  if (units > 9) return false;
-  for (++at; at != end && is_digit(*at); ++at) {
-    units = units * 10 + digit_of(*at);
-    if (units > max_units) return false;
-  }
-  std::uint32_t hundredths = 100 * units;
-  if (at != end) {
-    if (*at != '.' || ++at == end || !is_digit(*at)) return false;
-    hundredths += 10 * digit_of(*at);
-    if (++at != end) {
-      if (!is_digit(*at)) return false;
-      hundredths += digit_of(*at);
-      while (++at != end) {
-        if (!is_digit(*at)) return false;
-      }
-    }
-  }
-  out = with_sign(negative, hundredths);
+  char terminated[41] = {};
+  if (text.empty() || text.size() >= sizeof terminated) return false;
+  std::memcpy(terminated, text.data(), text.size());
+  const char* at = terminated;
+  std::int32_t hundredths = 0;
+  if (!take_hundredths(at, hundredths) || at != terminated + text.size()) return false;
+  out = hundredths;
   return true;
 }
 

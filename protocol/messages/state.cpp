@@ -5,6 +5,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "../datagram/field_reader.hpp"
 #include "../datagram/numbers.hpp"
 #include "../datagram/word_index.hpp"
 #include "device_fields.hpp"
@@ -64,74 +65,52 @@ Member& member(State& state, const Entry& entry) {
 constexpr Text name_of_entry(const Entry& entry) { return entry.name.name(); }
 constexpr WordIndex<Entry, state_field_count, name_of_entry> name_index(field_table.entries);
 
-bool parse_up_to(Text text, std::uint32_t limit, std::uint32_t& out) {
-  return parse_number(text, out) && out <= limit;
+bool read_drive(FieldReader& reader, Drive& out) {
+  return reader.take(pwm_max, out.pwm) && reader.take(',') && reader.take(1, out.direction);
 }
 
-// `Member` must hold 0 to `limit`.
-template <class Member>
-bool parse_into(Text text, std::uint32_t limit, Member& out) {
-  std::uint32_t value = 0;
-  if (!parse_up_to(text, limit, value)) return false;
-  out = static_cast<Member>(value);
-  return true;
+bool read_bldc(FieldReader& reader, Bldc& out) {
+  return reader.take(pwm_max, out.speed) && reader.take(',') && reader.take(1, out.direction) &&
+         reader.take(',') && reader.take(1, out.brake);
 }
 
-Text next_value(Text& rest) {
-  std::size_t size = 0;
-  while (size < rest.size() && rest[size] != ',') ++size;
-  const Text value = rest.substr(0, size);
-  rest = rest.substr(size < rest.size() ? size + 1 : size);
-  return value;
+bool read_fault(FieldReader& reader, ChipFault& out) {
+  return reader.take(0x7F, out.address) && reader.take(',') && reader.take(0xFF, out.trouble);
 }
 
-// A surplus value leaves a comma in `rest`. A missing value leaves `rest` empty. The parser refuses
-// both.
-bool parse_drive(Text rest, Drive& out) {
-  return parse_into(next_value(rest), pwm_max, out.pwm) && parse_into(rest, 1, out.direction);
-}
-
-bool parse_bldc(Text rest, Bldc& out) {
-  return parse_into(next_value(rest), pwm_max, out.speed) &&
-         parse_into(next_value(rest), 1, out.direction) && parse_into(rest, 1, out.brake);
-}
-
-bool parse_fault(Text rest, ChipFault& out) {
-  return parse_into(next_value(rest), 0x7F, out.address) && parse_into(rest, 0xFF, out.trouble);
-}
-
-bool parse_entry(Text text, const Entry& entry, State& state) {
+// Reads values in the form of `entry`. The caller refuses a surplus value.
+bool read_entry(FieldReader& reader, const Entry& entry, State& state) {
   switch (entry.form) {
     case Form::volts:
-      return parse_hundredths(text, member<std::int32_t>(state, entry));
+      return reader.take_hundredths(member<std::int32_t>(state, entry));
     case Form::handle:
-      return parse_into(text, 2, member<Handle>(state, entry));
+      return reader.take(2, member<Handle>(state, entry));
     case Form::drive:
-      return parse_drive(text, member<Drive>(state, entry));
+      return read_drive(reader, member<Drive>(state, entry));
     case Form::bldc:
-      return parse_bldc(text, member<Bldc>(state, entry));
+      return read_bldc(reader, member<Bldc>(state, entry));
     case Form::servo:
-      return parse_into(text, servo_max_us, member<std::uint16_t>(state, entry));
+      return reader.take(servo_max_us, member<std::uint16_t>(state, entry));
     case Form::u8:
-      return parse_into(text, 0xFF, member<std::uint8_t>(state, entry));
+      return reader.take(0xFF, member<std::uint8_t>(state, entry));
     case Form::u16:
-      return parse_into(text, 0xFFFF, member<std::uint16_t>(state, entry));
+      return reader.take(0xFFFF, member<std::uint16_t>(state, entry));
     case Form::i32:
-      return parse_number(text, member<std::int32_t>(state, entry));
+      return reader.take(member<std::int32_t>(state, entry));
     case Form::u32:
-      return parse_number(text, member<std::uint32_t>(state, entry));
+      return reader.take(0xFFFFFFFFU, member<std::uint32_t>(state, entry));
     case Form::reason:
-      return parse_safe_reason(text, member<SafeReason>(state, entry));
+      return parse_safe_reason(reader.take_values(), member<SafeReason>(state, entry));
     case Form::fault:
-      return parse_fault(text, member<ChipFault>(state, entry));
+      return read_fault(reader, member<ChipFault>(state, entry));
     case Form::reading:
-      return parse_device(text, member<I2cReading>(state, entry));
+      return parse_device(reader.take_values(), member<I2cReading>(state, entry));
     case Form::answer:
-      return parse_device(text, member<I2cAnswer>(state, entry));
+      return parse_device(reader.take_values(), member<I2cAnswer>(state, entry));
     case Form::bus:
-      return parse_device(text, member<I2cBusReport>(state, entry));
+      return parse_device(reader.take_values(), member<I2cBusReport>(state, entry));
     case Form::uart:
-      return parse_device(text, member<UartBytes>(state, entry));
+      return parse_device(reader.take_values(), member<UartBytes>(state, entry));
   }
   return false;
 }
@@ -253,21 +232,30 @@ class Before {
   char rare_[sizeof(State) - rare_place];
 };
 
+// The index of the field whose name is next; state_field_count for an unknown field.
+int take_index(FieldReader& reader, int expected) {
+  if (expected < state_field_count && reader.take_name(field_table.entries[expected].name.name())) {
+    return expected;
+  }
+  return static_cast<int>(state_field(reader.take_name()));
+}
+
 bool read_fields(const Datagram& datagram, State& state, Before& before) {
   FieldSet present;
   int expected = 0;  // boards send fields in the table's order
-  for (const Field& field : datagram) {
-    int index = expected;
-    if (index == state_field_count || field_table.entries[index].name.name() != field.name()) {
-      index = static_cast<int>(state_field(field.name()));
-      if (index == state_field_count) continue;
+  for (FieldReader reader(datagram); !reader.at_end();) {
+    const int index = take_index(reader, expected);
+    if (index == state_field_count) {
+      reader.take_values();
+    } else {
+      const auto which = static_cast<StateField>(index);
+      const Entry& entry = field_table.entries[index];
+      before.will_change(entry);
+      if (present.has(which) || !read_entry(reader, entry, state)) return false;
+      present.add(which);
+      expected = index + 1;
     }
-    const auto which = static_cast<StateField>(index);
-    const Entry& entry = field_table.entries[index];
-    before.will_change(entry);
-    if (present.has(which) || !parse_entry(field.values(), entry, state)) return false;
-    present.add(which);
-    expected = index + 1;
+    if (!reader.take(';')) return false;
   }
   state.present = present;
   return true;

@@ -126,6 +126,8 @@ TEST(Numbers, DecimalsAreReadAsHundredths) {
                                  "1.-2", "1.2x", "1,2", "nan", "inf", "-", "."}) {
     EXPECT_FALSE(hundredths(text)) << text;
   }
+  EXPECT_EQ(hundredths("1." + std::string(38, '9')), 199);
+  EXPECT_FALSE(hundredths("1." + std::string(39, '9'))) << "41 characters";
 }
 
 TEST(Numbers, BytesInHexadecimalAreTwoDigitsEach) {

@@ -359,6 +359,12 @@ TEST(State, ADuplicateFieldRefusesTheWholeDatagram) {
   EXPECT_TRUE(accepts("NEW:1;NEW:1;")) << "unknown fields are ignored";
 }
 
+TEST(State, AnEmptyDatagramHasNoFields) {
+  State state = numbered_state();
+  EXPECT_TRUE(read_state(Datagram(), state));
+  EXPECT_TRUE(state.present.empty());
+}
+
 TEST(State, FindsOnlyExactFieldNames) {
   std::set<std::string> names;
   for (const StateField field : every_field()) {

@@ -68,11 +68,13 @@ bool put_count(DigitWriter& digits, std::uint64_t value) {
   return count <= longest_count && digits.put(count, 1) && digits.put(value, count);
 }
 
+// `text`: all values of a field of a datagram, so a semicolon follows.
 bool put_hundredths(DigitWriter& digits, Text text) {
+  const char* at = text.begin();
   std::int32_t value = 0;
   // Exactly two decimals, no sign, no leading zero except directly before the point.
   return text.size() >= 4 && *(text.end() - 3) == '.' && (text[0] != '0' || text.size() == 4) &&
-         parse_hundredths(text, value) && value >= 0 && text[0] != '-' &&
+         take_hundredths(at, value) && at == text.end() && value >= 0 && text[0] != '-' &&
          put_fixed(digits, static_cast<std::uint64_t>(value), short3_max, 3);
 }
 
