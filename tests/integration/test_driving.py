@@ -3,11 +3,12 @@
 simulated motors have supply only while relay 1 is closed, as on a real robot."""
 import pathlib
 import re
+import socket
 import subprocess
 
 import pytest
 
-from r4_process import Board, run
+from r4_process import ERROR, PATIENCE_S, Board, Running, driving, run
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
@@ -63,6 +64,26 @@ def test_a_motor_turns_only_while_relay_1_is_closed_and_the_handle_held(tmp_path
         turning = sensors(lambda each: each['supply'])
         assert sensors(lambda each: each['enc'][0] > turning['enc'][0])
         assert not sensors(lambda each: each['handle'] == 'released')['supply']
+
+
+def test_ctrl_c_switches_the_outputs_off_at_once():
+    with Board('udp://127.0.0.1:0', options=('--set', 'timeout,5000')) as board:
+        with driving(board.host_url, 'O:358,1,1') as host:
+            assert host.end() == 0, host.errors
+        board.executed('E:LEAVE')
+
+
+def test_ctrl_c_before_the_confirmation_is_an_error():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent_board:
+        silent_board.bind(('127.0.0.1', 0))
+        silent_board.settimeout(PATIENCE_S)
+        url = f'udp://127.0.0.1:{silent_board.getsockname()[1]}?listen=0'
+        with Running('send', url, 'O:358,1,1', '--timeout', '60') as host:
+            for _ in range(3):
+                silent_board.recv(1024)
+            assert host.end() == 3
+            assert 'O:358,1,1' in host.errors and 'it may have been executed' in host.errors
+            assert ERROR.search(host.errors), host.errors
 
 
 def test_events_from_standard_input_happen_at_once():

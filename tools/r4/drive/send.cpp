@@ -143,6 +143,7 @@ class Sender {
       ++i;
     }
     board_.open();
+    boards_.end_by_signal();  // so that Ctrl-C sends a farewell: the outputs are off at once
     send_next();
     boards_.run();
     require_one_board(board_);
@@ -150,6 +151,11 @@ class Sender {
     boards_.leave();
     tell_paths_down(paths, options_.json);
     if (failure_) throw Error(*failure_);
+    if (next_ != orders_.size()) {
+      throw Error(ErrorKind::refused, shown(orders_[next_]) + " to " + board_.name(),
+                  "interrupted before it was confirmed: it may have been executed",
+                  "look at the robot");
+    }
     return 0;
   }
 
