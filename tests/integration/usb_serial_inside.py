@@ -75,7 +75,7 @@ def listed_with_who_controls_it():
         held = listed()
         assert held['board_id'] == 'sim-1' and held['busy'], held
         assert held['held_by'] == {'program': 'r4', 'pid': host.process.pid, 'controls': True}, held
-        host.skip_past()
+        host.end()
 
 
 def streams_at_the_boards_rate():
