@@ -312,9 +312,9 @@ state has confirmed the previous command. If a command is not confirmed, r4 ends
 separated by semicolons, are a group: up to 16 commands O D S R P B Z and X:DAC. The board executes a
 group completely or not at all.
 
-When r4 ends, the board goes safe and switches its outputs off: --hold keeps them on. The motors turn only
-while relay 1, the motor supply, is closed. It is open at the start and after each safe state, and R:1,On
-closes it.
+When r4 ends, also by Ctrl-C, the board goes safe and switches its outputs off: --hold keeps them on. The
+motors turn only while relay 1, the motor supply, is closed. It is open at the start and after each safe
+state, and R:1,On closes it.
 
 Examples:
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On closes the motor supply
@@ -327,8 +327,9 @@ Examples:
   r4 send serial:auto X:SCAN                  the devices that answer on the user's I2C bus
   r4 send serial:auto X:READ,0x68,x75,1       register 0x75 of the device at 0x68
 
-Exit codes: 0 all commands were confirmed; 3 a command was refused or not confirmed in time; 2 a command or
-option is wrong, and nothing was sent; 4 the transport cannot be opened; 5 permission denied.)";
+Exit codes: 0 all commands were confirmed; 3 a command was refused, or not confirmed in time or before
+Ctrl-C; 2 a command or option is wrong, and nothing was sent; 4 the transport cannot be opened; 5 permission
+denied.)";
 
 }  // namespace
 
