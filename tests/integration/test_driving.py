@@ -3,12 +3,15 @@
 simulated motors have supply only while relay 1 is closed, as on a real robot."""
 import pathlib
 import re
+import select
+import signal
 import socket
 import subprocess
+import threading
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, Board, Running, driving, run
+from r4_process import Board, Running, driving, run
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
@@ -66,24 +69,60 @@ def test_a_motor_turns_only_while_relay_1_is_closed_and_the_handle_held(tmp_path
         assert not sensors(lambda each: each['handle'] == 'released')['supply']
 
 
-def test_ctrl_c_switches_the_outputs_off_at_once():
+def test_ctrl_c_switches_the_outputs_off_at_once_and_ends_the_script():
     with Board('udp://127.0.0.1:0', options=('--set', 'timeout,5000')) as board:
         with driving(board.host_url, 'O:358,1,1') as host:
-            assert host.end() == 0, host.errors
+            assert host.end() == -signal.SIGINT, 'a shell would continue its script'
         board.executed('E:LEAVE')
 
 
-def test_ctrl_c_before_the_confirmation_is_an_error():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent_board:
-        silent_board.bind(('127.0.0.1', 0))
-        silent_board.settimeout(PATIENCE_S)
-        url = f'udp://127.0.0.1:{silent_board.getsockname()[1]}?listen=0'
-        with Running('send', url, 'O:358,1,1', '--timeout', '60') as host:
-            for _ in range(3):
-                silent_board.recv(1024)
-            assert host.end() == 3
-            assert 'O:358,1,1' in host.errors and 'it may have been executed' in host.errors
-            assert ERROR.search(host.errors), host.errors
+class Relay:
+    """Carries datagrams between a host and a board, except those for which `drops` is true."""
+
+    def __init__(self, board_url, drops):
+        self.drops = drops
+        self.near, self.far = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        self.near.bind(('127.0.0.1', 0))
+        self.far.connect(('127.0.0.1', int(re.search(r':(\d+)', board_url[6:])[1])))
+        self.url = f'udp://127.0.0.1:{self.near.getsockname()[1]}?listen=0'
+        self.host = None
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self):
+        while True:
+            for ready in select.select([self.near, self.far], [], [])[0]:
+                datagram, peer = ready.recvfrom(2048)
+                if ready is self.near:
+                    self.host = peer
+                if self.drops(datagram):
+                    continue
+                if ready is self.near:
+                    self.far.send(datagram)
+                else:
+                    self.near.sendto(datagram, self.host)
+
+
+def test_ctrl_c_before_the_confirmation_is_reported_and_switches_the_outputs_off():
+    sent, farewells = threading.Event(), []
+
+    def drops(datagram):
+        """The states after the command, so that it is not confirmed, and the first farewell."""
+        if datagram.startswith(b'O:'):
+            sent.set()
+        if datagram.startswith(b'E:LEAVE'):
+            farewells.append(datagram)
+            return len(farewells) == 1
+        return sent.is_set() and b';CMD:' in datagram
+
+    with Board('udp://127.0.0.1:0', options=('--set', 'timeout,5000')) as board:
+        relay = Relay(board.host_url, drops)
+        with Running('send', relay.url, 'R:1,On', 'O:358,1,1', '--timeout', '60') as host:
+            board.executed('O:358,1,1')
+            assert host.end() == -signal.SIGINT
+            assert host.errors.startswith('r4: O:358,1,1 to udp://127.0.0.1:'), host.errors
+            assert ': interrupted: it may have been executed; look at the robot' in host.errors
+        board.executed('E:LEAVE')
+    assert len(farewells) > 1, 'a lost farewell is repeated'
 
 
 def test_events_from_standard_input_happen_at_once():

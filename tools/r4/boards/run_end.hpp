@@ -23,8 +23,20 @@ class RunEnd {
     for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
       if (!is_ignored(number)) signals_.add(number);
     }
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    signals_.async_wait([this](const std::error_code& error, int number) {
+      if (!error) signal_ = number;
+      io_.stop();
+    });
     if (duration) limit_.after(*duration, [this] { io_.stop(); });
+  }
+
+  bool by_signal() const { return signal_ != 0; }
+  // If a signal has ended the run, ends the program by this signal. So a shell also ends the script
+  // that runs the program, which it would continue after an exit code.
+  void raise_again() {
+    if (!by_signal()) return;
+    signals_.clear();
+    std::raise(signal_);
   }
 
  private:
@@ -36,6 +48,7 @@ class RunEnd {
   asio::io_context& io_;
   asio::signal_set signals_;
   Timer limit_;
+  int signal_ = 0;
 };
 
 }  // namespace r4::tool

@@ -148,14 +148,16 @@ class Sender {
     boards_.run();
     require_one_board(board_);
     const std::vector<PathStatus> paths = board_.paths();
+    leaving_ = true;
+    hold_.cancel();
     boards_.leave();
     tell_paths_down(paths, options_.json);
     if (failure_) throw Error(*failure_);
     if (next_ != orders_.size()) {
-      throw Error(ErrorKind::refused, shown(orders_[next_]) + " to " + board_.name(),
-                  "interrupted before it was confirmed: it may have been executed",
-                  "look at the robot");
+      print_trouble("r4: {} to {}: interrupted: it may have been executed; look at the robot",
+                    shown(orders_[next_]), board_.name());
     }
+    boards_.raise_signal_again();
     return 0;
   }
 
@@ -182,6 +184,7 @@ class Sender {
            is(CommandKind::i2c_scan, order);
   }
   void tell(const CommandResult& result) {
+    if (leaving_) return;  // the farewell ends the command, and boards_.stop() would end the farewell
     const std::size_t size = link_timing_at(orders_, next_) ? 2 : 1;
     std::string text = shown(orders_[next_]);
     if (size == 2) text += " " + shown(orders_[next_ + 1]);
@@ -291,6 +294,7 @@ class Sender {
   BoardSet boards_;
   AsyncBoard& board_;
   Timer hold_;
+  bool leaving_ = false;
   std::size_t next_ = 0;
   std::optional<Problem> failure_;
   std::optional<Problem> down_;  // the latest reason why the transport was down
@@ -327,9 +331,9 @@ Examples:
   r4 send serial:auto X:SCAN                  the devices that answer on the user's I2C bus
   r4 send serial:auto X:READ,0x68,x75,1       register 0x75 of the device at 0x68
 
-Exit codes: 0 all commands were confirmed; 3 a command was refused, or not confirmed in time or before
-Ctrl-C; 2 a command or option is wrong, and nothing was sent; 4 the transport cannot be opened; 5 permission
-denied.)";
+Exit codes: 0 all commands were confirmed; 3 a command was refused or not confirmed in time; 2 a command or
+option is wrong, and nothing was sent; 4 the transport cannot be opened; 5 permission denied. After Ctrl-C,
+the signal's.)";
 
 }  // namespace
 
