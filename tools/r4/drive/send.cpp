@@ -184,7 +184,7 @@ class Sender {
            is(CommandKind::i2c_scan, order);
   }
   void tell(const CommandResult& result) {
-    if (leaving_) return;  // the farewell ends the command, and boards_.stop() would end the farewell
+    if (leaving_) return;  // boards_.stop() would end the farewell
     const std::size_t size = link_timing_at(orders_, next_) ? 2 : 1;
     std::string text = shown(orders_[next_]);
     if (size == 2) text += " " + shown(orders_[next_ + 1]);
