@@ -227,7 +227,7 @@ def test_an_invalid_kernel_package_of_the_user_is_named():
 
 def test_a_kernel_panic_is_reported(tmp_path):
     cache = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
-    shutil.copytree(f'{cache}/r4link', tmp_path / 'r4link', copy_function=os.symlink)
+    shutil.copytree(f'{cache}/r4link/with-can', tmp_path / 'r4link' / 'with-can', copy_function=os.symlink)
     for initrd in tmp_path.glob('r4link/with-can/kernel-*/initrd'):
         initrd.unlink()
         initrd.write_bytes(b'')
