@@ -100,7 +100,7 @@ class HostOnPaths(Running):
         missed = [each for each in log if self.began < each.get('at', 0) < self.ended and each.get('active') is False]
         # A busy machine may delay a command until it is too old.
         missed += [each for each in commands if not each['confirmed'] and 'STALE' not in each['error']]
-        assert not missed, missed
+        assert not missed, (missed, self.began, self.ended)
         assert gap <= within(LONGEST_GAP_S)
         return commands
 
