@@ -7,9 +7,6 @@ namespace {
 constexpr std::uint64_t u32_max = 0xFFFFFFFFU;
 constexpr std::uint64_t u64_max = ~std::uint64_t{0};
 
-// One to nine digits always fit, and need no 64-bit arithmetic.
-constexpr bool fits_32_bits(std::size_t digits) { return digits - 1 < 9; }
-
 inline bool parse_short(const char* at, const char* end, std::uint32_t& out) {
   std::uint32_t value = 0;
   do {

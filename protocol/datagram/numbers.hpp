@@ -56,13 +56,15 @@ char* write_session_id(char* out, SessionId sid);  // session_id_size characters
 // The digit's value; above 9 if `c` is not a digit.
 constexpr unsigned digit_value(char c) { return unsigned{static_cast<unsigned char>(c)} - '0'; }
 constexpr bool is_decimal_digit(char c) { return digit_value(c) <= 9; }
+// One to nine digits always fit, and need no 64-bit arithmetic.
+constexpr bool fits_32_bits(std::size_t digits) { return digits - 1 < 9; }
 
 inline bool take_number(const char*& at, std::uint32_t& out) {
   const char* const first = at;
   std::uint32_t value = 0;
   for (; is_decimal_digit(*at); ++at) value = value * 10 + digit_value(*at);
   const auto size = static_cast<std::size_t>(at - first);
-  if (size - 1 >= 9) return parse_number(Text(first, size), out);  // nine digits always fit
+  if (!fits_32_bits(size)) return parse_number(Text(first, size), out);
   out = value;
   return true;
 }

@@ -11,7 +11,7 @@ import threading
 
 import pytest
 
-from r4_process import Board, Running, driving, run
+from r4_process import PATIENCE_S, Board, Running, driving, run
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
@@ -76,7 +76,7 @@ def test_ctrl_c_switches_the_outputs_off_at_once_and_ends_the_script():
         board.executed('E:LEAVE')
 
 
-class Relay:
+class DroppingRelay:
     """Carries datagrams between a host and a board, except those for which `drops` is true."""
 
     def __init__(self, board_url, drops):
@@ -115,14 +115,26 @@ def test_ctrl_c_before_the_confirmation_is_reported_and_switches_the_outputs_off
         return sent.is_set() and b';CMD:' in datagram
 
     with Board('udp://127.0.0.1:0', options=('--set', 'timeout,5000')) as board:
-        relay = Relay(board.host_url, drops)
+        relay = DroppingRelay(board.host_url, drops)
         with Running('send', relay.url, 'R:1,On', 'O:358,1,1', '--timeout', '60') as host:
             board.executed('O:358,1,1')
             assert host.end() == -signal.SIGINT
             assert host.errors.startswith('r4: O:358,1,1 to udp://127.0.0.1:'), host.errors
-            assert ': interrupted: it may have been executed; look at the robot' in host.errors
+            assert 'interrupted before it was confirmed; look at the robot: it may have been executed' in host.errors
         board.executed('E:LEAVE')
     assert len(farewells) > 1, 'a lost farewell is repeated'
+
+
+def test_ctrl_c_before_a_stop_is_confirmed_says_to_cut_the_power():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent_board:
+        silent_board.bind(('127.0.0.1', 0))
+        silent_board.settimeout(PATIENCE_S)
+        url = f'udp://127.0.0.1:{silent_board.getsockname()[1]}?listen=0'
+        with Running('send', url, 'E:STOP', '--timeout', '60') as host:
+            while not silent_board.recv(1024).startswith(b'E:STOP'):
+                pass
+            assert host.end() == -signal.SIGINT
+            assert 'E:STOP to udp://127.0.0.1:' in host.errors and 'before it was confirmed; cut the power' in host.errors
 
 
 def test_events_from_standard_input_happen_at_once():

@@ -53,7 +53,6 @@ class BoardSet {
     end_.watch(duration);
   }
   void run() { io_.run(); }
-  bool ended_by_signal() const { return end_.by_signal(); }
   void raise_signal_again() { end_.raise_again(); }
   // Ends run(). Callbacks for datagrams from the same read may follow.
   void stop() { io_.stop(); }

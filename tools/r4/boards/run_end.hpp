@@ -30,11 +30,10 @@ class RunEnd {
     if (duration) limit_.after(*duration, [this] { io_.stop(); });
   }
 
-  bool by_signal() const { return signal_ != 0; }
-  // If a signal has ended the run, ends the program by this signal. So a shell also ends the script
-  // that runs the program, which it would continue after an exit code.
+  // If a signal has ended the run, ends the program by this signal. So a shell also ends its
+  // script: after an exit code, the shell would continue the script.
   void raise_again() {
-    if (!by_signal()) return;
+    if (signal_ == 0) return;
     signals_.clear();
     std::raise(signal_);
   }

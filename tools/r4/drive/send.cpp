@@ -154,8 +154,10 @@ class Sender {
     tell_paths_down(paths, options_.json);
     if (failure_) throw Error(*failure_);
     if (next_ != orders_.size()) {
-      print_trouble("r4: {} to {}: interrupted: it may have been executed; look at the robot",
-                    shown(orders_[next_]), board_.name());
+      const bool stop = is(CommandKind::stop, orders_[next_]);
+      print_trouble("r4: {} to {}: interrupted before it was confirmed; {}", shown(orders_[next_]),
+                    board_.name(),
+                    stop ? "cut the power" : "look at the robot: it may have been executed");
     }
     boards_.raise_signal_again();
     return 0;
@@ -332,8 +334,8 @@ Examples:
   r4 send serial:auto X:READ,0x68,x75,1       register 0x75 of the device at 0x68
 
 Exit codes: 0 all commands were confirmed; 3 a command was refused or not confirmed in time; 2 a command or
-option is wrong, and nothing was sent; 4 the transport cannot be opened; 5 permission denied. After Ctrl-C,
-the signal's.)";
+option is wrong, and nothing was sent; 4 the transport cannot be opened; 5 permission denied. Ctrl-C ends r4
+by the signal: 130 in a shell.)";
 
 }  // namespace
 
