@@ -13,8 +13,9 @@ constexpr std::uint8_t bit(std::uint8_t number, bool on) {
 constexpr Chip pwm_chips[] = {Chip::osmc_pwm, Chip::dhb12_pwm, Chip::servo_pwm};
 
 // First the brushless motors and the relays, which the all-call does not reach.
-constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
-                                         Chip::servo_pwm};
+constexpr Chip safe_order[] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
+                               Chip::servo_pwm};
+static_assert(sizeof safe_order / sizeof *safe_order == chip_count, "every chip is made safe");
 
 unsigned level(Place place, bool on) {
   return place.connected() && on != place.option() ? 1U << place.number() : 0U;

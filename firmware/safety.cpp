@@ -39,6 +39,8 @@ SafeReason Safety::reason() const {
   static const SafeReason gravest_first[] = {SafeReason::stop,      SafeReason::fault,
                                              SafeReason::watchdog,  SafeReason::handle,
                                              SafeReason::proximity, SafeReason::link};
+  static_assert(sizeof gravest_first / sizeof *gravest_first == safe_reason_count - 1,
+                "each reason but none has its place");
   for (const SafeReason cause : gravest_first) {
     if (has(cause)) return cause;
   }

@@ -64,7 +64,7 @@ class ChipDriver {
   virtual void want_safe() = 0;
   // All outputs off at once, in any state. Does not change trouble(): the caller uses note().
   virtual I2cResult make_safe() = 0;
-  // Takes the result of a transfer that was made for this driver.
+  // Takes the result of a transfer that was made for this driver. True if the transfer succeeded.
   bool note(I2cResult result);
 
  protected:

@@ -36,7 +36,7 @@ bool has_site_setting(const Datagram& datagram) {
   return false;
 }
 
-// Only an absence, such as of an unplugged device, may end by itself.
+// True if the error means an absence, such as an unplugged device, which may end by itself.
 bool is_absence(ErrorKind kind) {
   return kind == ErrorKind::open || kind == ErrorKind::unsupported || kind == ErrorKind::refused;
 }

@@ -15,7 +15,7 @@ namespace r4 {
 
 namespace {
 
-// The key in "C:key,value". Without a comma it ends at a space, colon or equals sign.
+// The key in "C:key,value". In a wrong text, a space, colon or equals sign also ends it.
 std::string_view key_in(std::string_view text) {
   const std::string_view key = text.substr(2);
   return key.substr(0, key.find_first_of(", :="));

@@ -247,10 +247,14 @@ void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, T
   }
 }
 
-void CommandsUnderWay::expire(Time now) {
+bool CommandsUnderWay::expire(Time now) {
+  bool stop = false;
   for (Pending& pending : pending_.under_way()) {
-    if (now >= pending.deadline) finish(pending, Outcome::timed_out, Refusal::none, now);
+    if (now < pending.deadline) continue;
+    if (pending.kind == CommandKind::stop && pending.is_out()) stop = true;
+    finish(pending, Outcome::timed_out, Refusal::none, now);
   }
+  return stop;
 }
 
 void CommandsUnderWay::refuse_held_back(Time now) {

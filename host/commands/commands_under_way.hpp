@@ -18,8 +18,9 @@
 //
 // E:STOP does not wait for the link. E:STOP is repeated every 20 ms until a heartbeat reports the
 // reason `stop` and the number of this stop. Then it is repeated for stop_linger, because an
-// E:CLEAR of another program may arrive. E:CLEAR names the cause that was known at the call, and is
-// given up when the board reports a newer cause.
+// E:CLEAR of another program may arrive. If the deadline of a stop ends before the confirmation,
+// the session ends (Session::end_session()). E:CLEAR names the cause that was known at the call,
+// and is given up when the board reports a newer cause.
 #pragma once
 
 #include <cstddef>
@@ -78,7 +79,8 @@ class CommandsUnderWay {
   // True if arm() has to wait for a step, a stop, or an earlier E:CLEAR.
   bool delays_arming();
 
-  void expire(Time now);
+  // True if a stop ended without a confirmation.
+  bool expire(Time now);
   void send_queued(Time now);
   // Ends held back output commands that do not wait for an arm().
   void refuse_held_back(Time now);

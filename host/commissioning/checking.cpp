@@ -131,7 +131,7 @@ BoardWiring Checking::wiring_after_restart() {
   }
 }
 
-// Clears a cause that only a person may clear. False if the cause cannot be cleared.
+// Asks the person, then clears the cause. False if E:CLEAR does not clear this kind of cause.
 bool Checking::clear_cause(const LinkStatus& link) {
   const bool unconfirmed =
       link.reason == SafeReason::fault && link.chip.trouble == ChipTrouble::not_confirmed;

@@ -107,7 +107,8 @@ void set_full_scale(Checking& c, int input, double volts) {
   c.send(Command::setting(name, Text(value)));
 }
 
-// The board does not report its full scale. The shown voltage with a known full scale gives it.
+// The board does not report its full scale. It follows from the voltage that the board shows with a
+// known full scale.
 void give_full_scale(Checking& c, const Learnt& learnt) {
   constexpr double known = 50;
   const int input = learnt.signal - signals::analog + 1;

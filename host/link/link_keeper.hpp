@@ -60,7 +60,8 @@ class LinkKeeper {
   bool is_leaving() const { return leaving_; }
   LinkStatus status(ChipFault fault, Time now) const;
 
-  // Adds the needed fields to an F, and remembers it. The text is valid until the next call.
+  // Adds the needed fields to an F, and remembers the fields. The text is valid until the next
+  // call.
   Command with_needed_fields(const Command& command);
 
  private:

@@ -28,7 +28,7 @@ class IdentityQuestion {
     if (std::any_of(open_.begin(), open_.end(), same)) return;
     open_[count_++ % open_.size()] = {pnum, now, true};
   }
-  // Returns when the answered question was first sent. If the question is not open: no value.
+  // Returns the time at which the answered question was first sent; no value if it is not open.
   std::optional<Time> answered(const Identity& identity) {
     for (std::size_t i = 1; i <= open_.size(); ++i) {
       Asked& asked = open_[(count_ - i) % open_.size()];

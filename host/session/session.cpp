@@ -60,7 +60,8 @@ void Session::poll(Time now) {
   keeper_.ask_paths(now);
   refresh(now);
   keeper_.keep_alive(now);
-  commands_.expire(now);
+  const bool stop_failed = commands_.expire(now) && !keeper_.is_leaving();
+  if (stop_failed && !watches() && link_.has_heard()) end_session(now);
   arming_.expire(now);
   if (!keeper_.controls()) keeper_.select_fields(now);  // before commands, when the link comes up
   commands_.send_queued(now);
@@ -101,11 +102,16 @@ void Session::on_transport(std::size_t path, bool up, Time now, bool can_ask) {
   refresh(now);
 }
 
-// Ends the session at once, because a board with a longer timeout may be driving.
 void Session::on_sleep(Time now) {
-  if (may_say_farewell()) outbox_.send(Command::leave(), {.echo = link_.echo()}, now);
   commands_.forget_stop();
   arming_.on_sleep();
+  end_session(now);
+}
+
+// The outputs never resume: the next session begins with all outputs off. The farewell switches
+// them off at once, because the board's timeout may be long.
+void Session::end_session(Time now) {
+  if (may_say_farewell()) outbox_.send(Command::leave(), {.echo = link_.echo()}, now);
   forget_board(now);
   refresh(now);
 }

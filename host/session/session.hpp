@@ -133,6 +133,7 @@ class Session {
   void take_step_end(Time now);
   void on_restart(Time now);
   void on_new_boot(Time now);
+  void end_session(Time now);
   void forget_board(Time now);
   void begin_session();
   bool may_say_farewell() const;
@@ -162,7 +163,8 @@ inline bool is_ready(BoardRole role, const LinkStatus& link) {
 }
 
 // Posts a command or a group. For a board without groups, the commands are posted one after the
-// other, up to the first that is not sent. send_all() sends the effects, and may advance `now`.
+// other, up to the first command that is not sent. send_all() sends the effects, and may advance
+// `now`.
 template <class What, class SendAll>
 PostResult post_by(Session& session, const What& what, const Time& now, SendAll send_all) {
   if constexpr (std::is_same_v<What, Setpoints>) {

@@ -183,8 +183,8 @@ class R4LINK_API Board {
   DisarmCause disarmed_by() const;
 
   // Makes every output safe at once, and repeats until the board confirms. The stop lasts until
-  // Command::clear(), or arm() of the same program. Without a confirmation, the error advises to
-  // cut the power.
+  // Command::clear(), or arm() of the same program. Without a confirmation within the timeout, the
+  // error advises to cut the power, and a new session begins: the outputs do not resume.
   void stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 

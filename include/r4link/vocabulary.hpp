@@ -80,7 +80,7 @@ enum class Handle : std::uint8_t {
 };
 R4LINK_API const char* to_text(Handle handle);
 
-// The number is the value of the FAULT field.
+// The number is the second value of the field FAULT (chip,trouble).
 enum class ChipTrouble : std::uint8_t {
   none = 0,
   no_acknowledge = 1,  // the chip does not answer

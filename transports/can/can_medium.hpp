@@ -45,7 +45,7 @@ class CanMedium {
   virtual void close() noexcept = 0;
   // The descriptor, readable after frames have arrived or the medium has failed; -1 while closed.
   virtual int number() const = 0;
-  // True without a controller and a wire: frames arrive as fast as programs send them.
+  // True if there is no controller and no wire: frames arrive as fast as programs send them.
   virtual bool simulated() const { return false; }
   virtual bool heard_rate_switch() const { return false; }
   virtual std::string state() const { return ""; }

@@ -61,7 +61,7 @@ class ShareClient {
   LoopTimer timer_;
   OperationSlot answering_;
   pid_t process_ = 0;
-  // 0: heard since the last expect_answer(); 1: not heard; 2: not heard, and asked.
+  // 0: the holder was heard since the last expect_answer(); 1: not heard; 2: asked, and not heard.
   int silence_ = 0;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The messages between programs that share a transport (docs/how-to/sharing.md), one a packet.
-//     hello     h VERSION     to the holder: requests copies of all datagrams, or an answer
+//     hello     h VERSION     to the holder: requests all datagrams, or an answer
 //     ask       c VERSION     a controlling program requests the transport; answer: disconnect
 //     welcome   w VERSION     the answer to hello, and to an invalid message
 //     event     e u|d|! KIND THING 0 REASON 0 FIX    the transport is up, down, has a warning

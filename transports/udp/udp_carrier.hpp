@@ -27,7 +27,8 @@
 
 namespace r4 {
 
-// Throws Error{usage} for a wrong URL. Without a port in the URL, a host that yields takes any.
+// Throws Error{usage} for a wrong URL. If the URL has no port, a host that yields takes any free
+// port.
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role,
                                           Claim claim);
 

@@ -108,11 +108,12 @@ Text BootReport::chip(char (&out)[max_line]) {
   static constexpr struct {
     Text part;
     Text function;
-  } names[chip_count] = {{"PCA9685", "OSMC"},
-                         {"PCA9685", "DHB12"},
-                         {"PCA9685", "servos"},
-                         {"MCP23017", "relays, BLDC direction and brake"},
-                         {"MCP4728", "BLDC speed"}};
+  } names[] = {{"PCA9685", "OSMC"},
+               {"PCA9685", "DHB12"},
+               {"PCA9685", "servos"},
+               {"MCP23017", "relays, BLDC direction and brake"},
+               {"MCP4728", "BLDC speed"}};
+  static_assert(sizeof names / sizeof *names == chip_count, "one for each Chip");
   const auto& name = names[chip_];
   const auto chip = static_cast<Chip>(chip_++);
   const Place address = sources_.hardware->wiring().chip(chip);

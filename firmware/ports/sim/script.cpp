@@ -164,7 +164,8 @@ std::int32_t supply_of(const Line& line, const char* what) {
 }
 
 void read_chip(const Line& line, ScriptStep& step) {
-  static constexpr std::string_view chips[chip_count] = {"osmc", "dhb", "servo", "expander", "dac"};
+  static constexpr std::string_view chips[] = {"osmc", "dhb", "servo", "expander", "dac"};
+  static_assert(std::size(chips) == chip_count);
   const auto* const chip = std::find(std::begin(chips), std::end(chips), line.words[1]);
   if (chip == std::end(chips)) {
     fail(line, line.words[1], "is not a chip", "write osmc, dhb, servo, expander or dac");

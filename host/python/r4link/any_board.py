@@ -88,7 +88,8 @@ class AnyBoard(ABC, Generic[Sent]):
 
     def stop(self, timeout: float = 1.0) -> Sent:
         """Makes all outputs safe at once. The stop is repeated until confirmed, and latched until
-        Command.clear(), or arm() of the same program."""
+        Command.clear(), or arm() of the same program. If the stop is not confirmed within the timeout, raises an
+        error: cut the power. A new session then begins, so that the outputs do not resume."""
         sent: Sent = self._call(lambda core: core.stop(_ms(timeout)))
         return sent
 

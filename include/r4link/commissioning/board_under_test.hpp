@@ -42,7 +42,8 @@ class R4LINK_API BoardUnderTest {
   // While silent, only stops are sent, and no heartbeats.
   virtual void be_silent(bool silent) = 0;
 
-  // The transports that lead to the board. Functions without an argument `transport` use the first.
+  // The transports that lead to the board. Functions without an argument `transport` use the
+  // first transport.
   virtual std::vector<std::string> transports() = 0;
   struct Quality {
     double states_a_second = 0;

@@ -37,7 +37,7 @@ R4LINK_API std::vector<PatternUrl> expand_urls(std::string_view pattern);
 // The URLs of all patterns. Also throws Error{usage} for a duplicate URL.
 R4LINK_API std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
 
-// The URLs that a text joins, without a check.
+// The URLs of a text such as "URL+URL". The URLs are not checked.
 R4LINK_API std::vector<std::string> split_paths(std::string_view text);
 R4LINK_API std::string join_paths(const std::vector<std::string>& urls);
 // True if one of the joined URLs has the scheme.

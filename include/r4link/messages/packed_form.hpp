@@ -31,9 +31,10 @@ constexpr std::uint8_t packed_version = 1;
 constexpr bool is_packed(std::uint8_t first_byte) { return first_byte >= 0x80; }
 
 // Packs one datagram (without a line terminator). Returns the size at `out`, which is smaller than
-// the size of the datagram. Returns 0, with `out` undefined, if the datagram must be sent plain: it
-// is not valid, its checksum has another form than writers print, a name is too long, the packed
-// form is not shorter or exceeds `capacity` bytes.
+// the size of the datagram. If the datagram must be sent plain, returns 0, and `out` is undefined:
+//     the datagram is not valid, or its checksum has another form than writers print
+//     a name is too long
+//     the packed form is not shorter, or exceeds `capacity` bytes
 R4LINK_API std::size_t pack(Text datagram, std::uint8_t* out, std::size_t capacity);
 
 enum class UnpackError : std::uint8_t {

@@ -48,7 +48,7 @@ enum Index : std::uint8_t {
 };
 }  // namespace signals
 constexpr int signal_count = signals::count;
-static_assert(signals::dac_chip - signals::osmc_chip == static_cast<int>(Chip::dac),
+static_assert(signals::dac_chip - signals::osmc_chip == chip_count - 1,
               "the rows of the chips are in the order of Chip");
 
 struct SignalRow {

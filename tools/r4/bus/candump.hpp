@@ -4,7 +4,7 @@
 //                                                              #R for a remote request
 //     candump        (1436509052.249713)  vcan0  244   [4]  2A 36 6C 2B
 // Reads the extras of options -a, -x, -8 and -t (the time may be missing, relative or a date) and
-// python-can's channel names, and recognizes CAN XL frames. Any input is safe; nothing is stored.
+// python-can's channel names. Recognizes CAN XL frames. Any input is safe; nothing is stored.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,8 @@
 namespace r4::tool {
 namespace {
 
-// The default of Linux: 200 states. A CAN socket requests more and accepts less.
+// Bytes, enough for 200 states: the default of Linux. A CAN socket requests more, and works with
+// less.
 constexpr long least_receive_buffer = 212992;
 constexpr double noticeable_step_s = 0.010;
 constexpr const char* host_port = "2390";

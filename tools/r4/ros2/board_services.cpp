@@ -132,7 +132,7 @@ void BoardCommands::stop(Done done) {
   if (!stopping_) repeat_stop();
 }
 
-// Repeats until confirmed: after an outage the board would otherwise resume its previous outputs.
+// Repeats until confirmed, so that the board is also stopped after an outage.
 void BoardCommands::repeat_stop() {
   stopping_ = true;
   board_.async_send(Command::stop(), stop_patience, [this](const CommandResult& result) {

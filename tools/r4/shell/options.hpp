@@ -59,8 +59,8 @@ CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
 CLI::Option* add_paths(CLI::App& command, std::vector<std::string>& out);
 CLI::Option* add_boards(CLI::App& command, std::vector<std::string>& out);
 
-// Splits "URL... WORD...": the leading URLs are joined into `url`. Throws Error{usage} for a URL
-// after a word, and if no word, called `what`, is left.
+// Splits "URL... WORD...": the leading URLs are joined into `url`. Throws Error{usage} if a
+// URL follows a word, or if there is no word. `what`: the name of the words in the error.
 CLI::Option* add_url(CLI::App& command, std::string& out);
 void take_paths(std::string& url, std::vector<std::string>& words, const std::string& what);
 

@@ -151,7 +151,8 @@ class Bench {
                       });
   }
 
-  // False if the board refuses: the next command would only be refused again.
+  // True if the command was confirmed or timed out. After another outcome, the next command would
+  // have the same outcome.
   static bool count(const CommandResult& result, Durations& durations, std::uint64_t& failed) {
     if (result.outcome == Outcome::confirmed) {
       durations.add(result.elapsed);

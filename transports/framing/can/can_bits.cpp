@@ -22,7 +22,7 @@ constexpr std::uint32_t fd_arbitration_bits(bool extended) { return extended ? 3
 constexpr std::uint32_t fd_format_bits = 3;
 constexpr std::uint32_t error_state_bits = 1;
 
-// Stuff count and CRC with fixed stuff bits: one before them, one after every fourth bit.
+// Stuff count and CRC with fixed stuff bits: one before the count, one after every fourth bit.
 constexpr std::uint32_t stuff_count_bits = 4;
 constexpr std::uint8_t max_crc17_size = 16;  // bytes; CRC-21 for longer frames
 constexpr std::uint32_t fd_crc_field_bits(std::uint8_t size) {

@@ -20,14 +20,15 @@
 //     timer.arm(receiver.deadline());
 // A delivered datagram equals the sent datagram. Any error is counted and delivers nothing. There
 // is one exception, because ISO-TP distinguishes frames by four bits only. A frame 16 (32, 48 …)
-// places later in the same stream is accepted as the expected frame. Loss alone causes the
-// exception only without flow control and only across two transfers, if the end of one transfer,
-// the first frame of the next transfer and as many further frames as the numbers need are lost
-// within N_Cr. Then the datagram mixes both transfers. If both have n frames, n (or n - 16,
-// n - 32 …, but at least 2) frames in a row are lost. An N_Cr below the pause of transfers prevents
-// this. With flow control, the exception needs a flow control that arrives after N_Bs. By then the
-// sender has begun another transfer, whose first frame is lost, too. The datagram's CRC detects
-// both cases.
+// places later in the same stream is accepted as the expected frame. The datagram's CRC detects
+// the exception.
+//   Without flow control, the exception needs the loss of the end of one transfer, the first frame
+//   of the next transfer, and as many further frames as the numbers need, all within N_Cr. If both
+//   transfers have n frames, n (or n - 16, n - 32 …, but at least 2) frames in a row are lost: of
+//   transfers of 18 frames, such as frames 18, 1 of the two. The datagram mixes both transfers. An
+//   N_Cr below the pause of transfers prevents this.
+//   With flow control, the exception needs a flow control that arrives after N_Bs. By then the
+//   sender has begun another transfer, whose first frame is lost, too.
 #pragma once
 
 #include <cstdint>
@@ -55,14 +56,14 @@ struct IsotpReceiverCounters {
   std::uint32_t started = 0;  // single and first frames accepted
   std::uint32_t consecutive = 0;
   std::uint32_t datagrams = 0;
-  // These end a transfer.
+  // Events that end a transfer.
   std::uint32_t send_timeout = 0;
   std::uint32_t consecutive_timeout = 0;
   std::uint32_t wrong_sequence_number = 0;
   std::uint32_t interrupted = 0;
   std::uint32_t too_many_waits = 0;
   std::uint32_t cancelled = 0;
-  // These are refused or ignored.
+  // Frames that are refused or ignored.
   std::uint32_t overflow = 0;          // a datagram longer than the buffer
   std::uint32_t refusal_timeout = 0;   // part of `overflow`: not answered within N_Ar
   std::uint32_t unexpected_frame = 0;  // a consecutive frame that belongs to no transfer

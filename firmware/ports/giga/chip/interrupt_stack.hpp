@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The stacks of interrupt handlers. The core gives all handlers one stack of 1 KB at the end of the
-// RAM, and its USB handler takes more than half of it. So our handlers have a stack of their own:
+// RAM. Its USB handler takes more than half of this stack. So our handlers have their own stack:
 //     stack    bytes   used by
 //     core's    1024   the core's handlers; edges of pins; our entries to on_own_stack()
 //     own       4096   our handlers, and core handlers that interrupt our handlers

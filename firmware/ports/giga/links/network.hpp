@@ -43,7 +43,7 @@ class Network {
   NetworkState state() const { return state_.load(std::memory_order_relaxed); }
   std::uint32_t ip() const { return ip_.load(std::memory_order_relaxed); }  // the board's; 0: none
 
-  // One turn of the thread. True: there may be more to do.
+  // One turn of the thread. True if there may be more to do.
   bool turn();
 
  private:

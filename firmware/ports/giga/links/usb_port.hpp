@@ -32,7 +32,7 @@ class UsbPort final : public firmware::Port {
   static void start();
   // Requests the interrupt for take_in(): SWPMI1_IRQn, otherwise unused. Call from anywhere.
   static void listen();
-  // Call in the interrupt of listen(). True: E:STOP was received.
+  // Call in the interrupt of listen(). True if E:STOP was received.
   bool take_in();
   bool has_received() const { return !received_.empty(); }
 

@@ -48,7 +48,7 @@ class PyBoard {
     });
   }
 
-  // Throws after a signal, which ends the waiting call on its thread.
+  // If Python has a pending signal, throws its exception, which ends the call that waits.
   static void on_wait() {
     const py::gil_scoped_acquire gil;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();

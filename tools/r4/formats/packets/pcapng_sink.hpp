@@ -14,7 +14,7 @@
 
 namespace r4::tool {
 
-// Descriptions (if_description) of r4's own interfaces. The path's number follows the second.
+// Descriptions (if_description) of r4's own interfaces. The path's number follows path_interface.
 inline constexpr std::string_view lines_interface = "r4log 1 lines";
 inline constexpr std::string_view path_interface = "r4log 1 path ";
 inline constexpr std::string_view made_up_host_text = "198.19.0.1";
