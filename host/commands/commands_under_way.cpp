@@ -238,10 +238,12 @@ void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, T
     if (pending.step != 0) result.executed = static_cast<std::uint8_t>(pending.step - 1);
   }
   effects_.end(pending.ticket, result, counts_);
-  if (pending.kind == CommandKind::stop && outcome == Outcome::confirmed) {
+  const bool failed = outcome == Outcome::timed_out;
+  if (pending.kind == CommandKind::stop && (failed || outcome == Outcome::confirmed)) {
     forget_stop();  // at most one stop lingers
     pending.stage = Stage::lingering;
-    pending.deadline = now + options_.stop_linger;
+    const Time timeout = std::chrono::milliseconds{options_.timing.timeout_ms};
+    pending.deadline = now + (failed ? timeout : Time{options_.stop_linger});
   } else {
     pending_.remove(pending);
   }

@@ -18,9 +18,10 @@
 //
 // E:STOP does not wait for the link. E:STOP is repeated every 20 ms until a heartbeat reports the
 // reason `stop` and the number of this stop. Then it is repeated for stop_linger, because an
-// E:CLEAR of another program may arrive. If the deadline of a stop ends before the confirmation,
-// the session ends (Session::end_session()). E:CLEAR names the cause that was known at the call,
-// and is given up when the board reports a newer cause.
+// E:CLEAR of another program may arrive. A stop that is not confirmed before its deadline has
+// failed: the session ends (Session::on_failed_stop()), and the stop is repeated for the board's
+// timeout, until which the board may obey the ended session. E:CLEAR names the cause that was known
+// at the call, and is given up when the board reports a newer cause.
 #pragma once
 
 #include <cstddef>
@@ -79,7 +80,7 @@ class CommandsUnderWay {
   // True if arm() has to wait for a step, a stop, or an earlier E:CLEAR.
   bool delays_arming();
 
-  // True if a stop ended without a confirmation.
+  // True if a stop failed.
   bool expire(Time now);
   void send_queued(Time now);
   // Ends held back output commands that do not wait for an arm().

@@ -22,8 +22,8 @@ namespace r4 {
 //                          +-------DUPLICATE-----------+--> executed
 //
 // A command may end in any of these states. A command is confirmed when CMD names it, or when CMD
-// has passed it and it was executed. A confirmed stop is repeated for stop_linger:
-//     sent --the board reports it--> lingering --the time is over, another stop, an E:CLEAR--> free
+// has passed it and it was executed. After its end, a stop is still repeated:
+//     sent --confirmed, timed out--> lingering --its time is over, another stop, E:CLEAR--> free
 //
 // A group that is sent one by one passes through these states once for each command.
 struct PendingCommand {
@@ -33,7 +33,7 @@ struct PendingCommand {
     sent,       // and repeated
     overtaken,  // CMD has passed the command: the answer to a retry decides
     executed,   // the board answered DUPLICATE
-    lingering,  // a confirmed stop, which is repeated
+    lingering,  // a stop whose end was reported, and which is repeated
   };
   Stage stage = Stage::free;
   CommandKind kind = CommandKind::heartbeat;

@@ -59,9 +59,8 @@ void Session::poll(Time now) {
   if (link_.long_silent(to_ms(now))) forget_board(now);
   keeper_.ask_paths(now);
   refresh(now);
+  if (commands_.expire(now)) on_failed_stop(now);  // before a heartbeat could resume the outputs
   keeper_.keep_alive(now);
-  const bool stop_failed = commands_.expire(now) && !keeper_.is_leaving();
-  if (stop_failed && !watches() && link_.has_heard()) end_session(now);
   arming_.expire(now);
   if (!keeper_.controls()) keeper_.select_fields(now);  // before commands, when the link comes up
   commands_.send_queued(now);
@@ -102,17 +101,22 @@ void Session::on_transport(std::size_t path, bool up, Time now, bool can_ask) {
   refresh(now);
 }
 
+// Ends the session at once, because a board with a longer timeout may be driving.
 void Session::on_sleep(Time now) {
+  if (may_say_farewell()) outbox_.send(Command::leave(), {.echo = link_.echo()}, now);
   commands_.forget_stop();
   arming_.on_sleep();
-  end_session(now);
+  forget_board(now);
+  refresh(now);
 }
 
-// The outputs never resume: the next session begins with all outputs off. The farewell switches
-// them off at once, because the board's timeout may be long.
-void Session::end_session(Time now) {
+// A new session begins, because the board would resume the outputs of the present session.
+void Session::on_failed_stop(Time now) {
+  if (watches() || keeper_.is_leaving()) return;
+  end_all_but_stops(Outcome::cancelled, now);
   if (may_say_farewell()) outbox_.send(Command::leave(), {.echo = link_.echo()}, now);
-  forget_board(now);
+  keeper_.begin_anew();
+  begin_session();
   refresh(now);
 }
 

@@ -133,7 +133,7 @@ class Session {
   void take_step_end(Time now);
   void on_restart(Time now);
   void on_new_boot(Time now);
-  void end_session(Time now);
+  void on_failed_stop(Time now);
   void forget_board(Time now);
   void begin_session();
   bool may_say_farewell() const;

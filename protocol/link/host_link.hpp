@@ -85,8 +85,6 @@ class HostLink {
   bool echoed() const { return echoed_; }
   std::uint32_t restarts() const { return restarts_; }
   SafeReason reason() const { return reason_; }
-  // True if the board was heard in this session.
-  bool has_heard() const { return heard_; }
   // True after 12 days of silence: the board's T may have wrapped, so begin_anew() is needed.
   bool long_silent(std::uint32_t now_ms) const { return heard_ && now_ms - heard_ms_ > long_ago; }
 

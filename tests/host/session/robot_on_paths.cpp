@@ -138,7 +138,11 @@ CommandResult RobotOnPaths::finish(Ticket ticket, std::uint32_t most_ms) {
 }
 
 void RobotOnPaths::run(std::uint32_t ms) {
-  for (; ms != 0; --ms) pass(false);
+  for (; ms != 0; --ms) pass(Host::runs);
+}
+
+void RobotOnPaths::stall(std::uint32_t ms) {
+  for (; ms != 0; --ms) pass(Host::stalls);
 }
 
 void RobotOnPaths::sleep(std::uint32_t ms) {
@@ -147,16 +151,16 @@ void RobotOnPaths::sleep(std::uint32_t ms) {
 }
 
 void RobotOnPaths::pause(std::uint32_t ms) {
-  for (; ms != 0; --ms) pass(true);
+  for (; ms != 0; --ms) pass(Host::sleeps);
 }
 
-void RobotOnPaths::pass(bool asleep) {
+void RobotOnPaths::pass(Host host) {
   ++now_ms_;
-  if (asleep) ++slept_ms_;
+  if (host == Host::sleeps) ++slept_ms_;
   for (std::size_t n = packets_.size(); n != 0; --n) {
     Packet packet = std::move(packets_.front());
     packets_.pop_front();
-    if (packet.at_ms > now_ms_) {
+    if (packet.at_ms > now_ms_ || (host == Host::stalls && !packet.to_board)) {
       packets_.push_back(std::move(packet));
     } else if (packet.to_board) {
       Board& at = *boards_[cables[packet.path].board];
@@ -165,17 +169,18 @@ void RobotOnPaths::pass(bool asleep) {
         at.application->receive(end->number, 1, Text(packet.bytes.data(), packet.bytes.size()),
                                 at.now());
       }
-    } else if (!asleep) {
+    } else if (host == Host::runs) {
       session->receive(packet.path, packet.bytes, now());
     }
   }
   for (const auto& each : boards_) each->application->poll(each->now());
-  if (!asleep) session->poll(now());
+  if (host == Host::runs) session->poll(now());
 }
 
 void RobotOnPaths::put(std::size_t path, bool to_board, std::string_view bytes) {
   const Cable& cable = cables[path];
   if (!up_[path] || (to_board ? cable.cut_to_board : cable.cut_to_host)) return;
+  if (to_board && !cable.loses.empty() && bytes.starts_with(cable.loses)) return;
   packets_.push_back({now_ms_ + cable.lag_ms, path, to_board, std::string(bytes)});
 }
 

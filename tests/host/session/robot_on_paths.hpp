@@ -29,6 +29,7 @@ class RobotOnPaths final : private DrivenSession::Handler {
     std::size_t board;
     bool listens = false;  // a bus, on which a watcher must not send questions
     bool cut_to_board = false, cut_to_host = false;
+    std::string loses;  // datagrams to the board that begin with this text are lost
     std::vector<std::string> sent;                    // datagrams sent by the host
     std::vector<std::string> all(char letter) const;  // the datagrams that begin with this letter
   };
@@ -43,6 +44,8 @@ class RobotOnPaths final : private DrivenSession::Handler {
   // Brings the transports of all paths up, and advances the time by half a second.
   void connect();
   void run(std::uint32_t ms);
+  // The host's loop stands still. Datagrams that arrive wait until the next run().
+  void stall(std::uint32_t ms);
   // The host sleeps: its clock stops, and datagrams that arrive meanwhile are lost. After waking,
   // the host's boot clock includes the sleep.
   void sleep(std::uint32_t ms);
@@ -103,7 +106,8 @@ class RobotOnPaths final : private DrivenSession::Handler {
     results.emplace(ticket, result);
   }
 
-  void pass(bool asleep);
+  enum class Host { runs, stalls, sleeps };
+  void pass(Host host);
 
   std::int64_t now_ms_ = 5'000'000;
   std::int64_t slept_ms_ = 0;

@@ -3,6 +3,9 @@
 // turn again, although the setting `recovery` is `last`.
 #include <gtest/gtest.h>
 
+#include <string>
+
+#include "r4link/link.hpp"
 #include "robot_on_paths.hpp"
 
 namespace r4::test {
@@ -10,7 +13,7 @@ namespace {
 
 using Cables = RobotOnPaths::Cables;
 
-class UnconfirmedStop : public ::testing::TestWithParam<Cables> {
+class FailedStop : public ::testing::TestWithParam<Cables> {
  protected:
   static bool drives(RobotOnPaths& of) { return of.board(0).outputs().osmc[0].pwm != 0; }
   static void cut_to_board(RobotOnPaths& of, bool is_cut) {
@@ -23,6 +26,9 @@ class UnconfirmedStop : public ::testing::TestWithParam<Cables> {
     cut_to_board(of, is_cut);
     cut_to_host(of, is_cut);
   }
+  static void lose(RobotOnPaths& of, const std::string& what) {
+    for (auto& cable : of.cables) cable.loses = what;
+  }
   // The call of the stop fails after RobotOnPaths::timeout, which is 1 s.
   static void fail_to_stop(RobotOnPaths& of) {
     ASSERT_EQ(of.finish(of.send(Command::stop())).outcome, Outcome::timed_out);
@@ -33,9 +39,18 @@ class UnconfirmedStop : public ::testing::TestWithParam<Cables> {
       ASSERT_FALSE(drives(of)) << ms << " ms later";
     }
   }
+  // The board obeys the host again. An E:CLEAR alone moves nothing.
+  static void expect_control(RobotOnPaths& of) {
+    if (of.board(0).reason() == SafeReason::stop) {
+      ASSERT_EQ(of.finish(of.send(Command::clear())).outcome, Outcome::confirmed);
+      of.run(200);
+      ASSERT_FALSE(drives(of));
+    }
+    EXPECT_EQ(of.drive(50).outcome, Outcome::confirmed);
+  }
 };
 
-TEST_P(UnconfirmedStop, IsNotFollowedByTheEarlierOutputs) {
+TEST_P(FailedStop, IsNotFollowedByTheEarlierOutputs) {
   for (const std::uint32_t outage_ms : {0U, 300U, 2000U, 60'000U}) {
     SCOPED_TRACE(outage_ms);
     RobotOnPaths robot(GetParam());
@@ -45,27 +60,39 @@ TEST_P(UnconfirmedStop, IsNotFollowedByTheEarlierOutputs) {
     robot.run(200);
     fail_to_stop(robot);
     robot.run(outage_ms);
+    ASSERT_FALSE(drives(robot));
     cut(robot, false);
-    robot.run(outage_ms < 1000 ? 1000 : 0);  // until the board's timeout at the latest
     expect_rest(robot);
-    EXPECT_EQ(robot.restarts, 1);
-    EXPECT_EQ(robot.drive(50).outcome, Outcome::confirmed) << "the board must obey the host again";
+    EXPECT_EQ(robot.restarts, 0) << "the board has not restarted";
+    expect_control(robot);
   }
 }
 
-TEST_P(UnconfirmedStop, EndsTheSessionAtOnceIfOnlyTheAnswersAreLost) {
-  RobotOnPaths robot(GetParam());
-  robot.connect();
-  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
-  cut_to_host(robot, true);
-  fail_to_stop(robot);
-  EXPECT_EQ(robot.board(0).reason(), SafeReason::stop);
-  cut_to_host(robot, false);
-  expect_rest(robot);
+// The link returns just before the stop fails: a heartbeat of the session could still be answered.
+TEST_P(FailedStop, IsNotFollowedByTheEarlierOutputsInAHostThatStoodStill) {
+  for (std::uint32_t back_ms = 900; back_ms <= 1020; back_ms += 4) {
+    SCOPED_TRACE(back_ms);
+    RobotOnPaths robot(GetParam());
+    robot.connect();
+    ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+    cut(robot, true);
+    robot.run(1000);
+    const Ticket stop = robot.send(Command::stop());
+    robot.run(890);
+    robot.stall(back_ms - 890);
+    cut(robot, false);
+    robot.stall(600);
+    int on_ms = 0;
+    for (int ms = 0; ms < 5000; ++ms) {
+      robot.run(1);
+      if (drives(robot)) ++on_ms;
+    }
+    EXPECT_EQ(on_ms, 0);
+    EXPECT_NE(robot.finish(stop).outcome, Outcome::none);
+  }
 }
 
-// Without its host's heartbeats, a board with a long timeout is safe after this timeout.
-TEST_P(UnconfirmedStop, LetsABoardWithALongTimeoutGoSafe) {
+TEST_P(FailedStop, LatchesIfTheLinkReturnsBeforeTheBoardIsSafe) {
   Settings settings;
   settings.timeout_ms = 5000;
   RobotOnPaths robot(GetParam(), RobotOnPaths::at_will(), BoardRole::control, settings);
@@ -75,11 +102,68 @@ TEST_P(UnconfirmedStop, LetsABoardWithALongTimeoutGoSafe) {
   fail_to_stop(robot);
   cut_to_board(robot, false);
   ASSERT_TRUE(drives(robot));
-  robot.run(4100);
+  robot.run(40);
+  EXPECT_EQ(robot.board(0).reason(), SafeReason::stop);
   expect_rest(robot);
+  expect_control(robot);
 }
 
-INSTANTIATE_TEST_SUITE_P(Paths, UnconfirmedStop, ::testing::Values(Cables{{1}}, Cables{{1}, {5}}));
+TEST_P(FailedStop, EndsTheSessionByAFarewellIfTheBoardReceivesThat) {
+  RobotOnPaths robot(GetParam());
+  robot.connect();
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  lose(robot, "E:STOP");
+  fail_to_stop(robot);
+  robot.run(20);
+  EXPECT_FALSE(drives(robot));
+  expect_rest(robot);
+  expect_control(robot);
+}
+
+TEST_P(FailedStop, IsRepeatedForTheBoardsTimeoutOnly) {
+  RobotOnPaths robot(GetParam());
+  robot.connect();
+  cut_to_board(robot, true);
+  fail_to_stop(robot);
+  robot.cables[0].sent.clear();
+  robot.run(900);
+  EXPECT_GT(robot.cables[0].all('E').size(), 40U);
+  robot.run(200);
+  robot.cables[0].sent.clear();
+  robot.run(1000);
+  EXPECT_TRUE(robot.cables[0].all('E').empty());
+}
+
+TEST_P(FailedStop, CancelsCommandsAndArmsThatWait) {
+  RobotOnPaths robot(GetParam(), SessionOptions());
+  robot.connect();
+  const Ticket arm = robot.session->arm(RobotOnPaths::timeout, robot.now());
+  ASSERT_EQ(robot.finish(arm).outcome, Outcome::confirmed);
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  cut(robot, true);
+  const Ticket stop = robot.send(Command::stop());
+  robot.run(500);
+  const Ticket late = robot.session->arm(std::chrono::seconds{30}, robot.now());
+  ASSERT_EQ(robot.finish(stop).outcome, Outcome::timed_out);
+  EXPECT_EQ(robot.finish(late).outcome, Outcome::cancelled);
+  EXPECT_EQ(robot.session->disarmed_by(), DisarmCause::stop);
+  cut(robot, false);
+  expect_rest(robot);
+  EXPECT_EQ(robot.drive(50).outcome, Outcome::not_armed);
+}
+
+TEST_P(FailedStop, IsExplainedByTheLinkAsItWas) {
+  RobotOnPaths robot(GetParam());
+  robot.connect();
+  lose(robot, "E:");
+  const Ticket ticket = robot.send(Command::stop());
+  const CommandResult result = robot.finish(ticket);
+  const Problem problem = explain(Command::stop(), result, robot.links.back());
+  EXPECT_NE(problem.reason.find("streams its state, and reports no stop"), std::string::npos)
+      << problem.reason;
+}
+
+INSTANTIATE_TEST_SUITE_P(Paths, FailedStop, ::testing::Values(Cables{{1}}, Cables{{1}, {5}}));
 
 }  // namespace
 }  // namespace r4::test
