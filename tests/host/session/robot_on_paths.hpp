@@ -29,8 +29,8 @@ class RobotOnPaths final : private DrivenSession::Handler {
     std::size_t board;
     bool listens = false;  // a bus, on which a watcher must not send questions
     bool cut_to_board = false, cut_to_host = false;
-    std::string loses;  // datagrams to the board that begin with this text are lost
-    std::vector<std::string> sent;                    // datagrams sent by the host
+    std::string loses;              // datagrams to the board that begin with this text are lost
+    std::vector<std::string> sent;  // datagrams sent by the host
     std::vector<std::string> all(char letter) const;  // the datagrams that begin with this letter
   };
 
