@@ -50,8 +50,12 @@ void CommandsUnderWay::on_state(Time now) {
 void CommandsUnderWay::on_stop(const SafeReport& report, Time now) {
   if (report.reason != SafeReason::stop || !report.has_stop) return;
   for (Pending& pending : pending_.under_way()) {
-    if (!pending.is_out() || pending.kind != CommandKind::stop) continue;
-    if (report.stop == pending.pnum) finish(pending, Outcome::confirmed, Refusal::none, now);
+    if (pending.kind != CommandKind::stop || report.stop != pending.pnum) continue;
+    if (pending.is_out()) {
+      finish(pending, Outcome::confirmed, Refusal::none, now);
+    } else {
+      pending.deadline = std::min(pending.deadline, now + options_.stop_linger);
+    }
   }
 }
 

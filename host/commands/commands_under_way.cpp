@@ -308,13 +308,19 @@ void CommandsUnderWay::remove_step() {
   }
 }
 
+bool CommandsUnderWay::is_stopping() {
+  for (const Pending& pending : pending_.under_way()) {
+    if (pending.kind == CommandKind::stop && pending.is_out()) return true;
+  }
+  return false;
+}
+
 bool CommandsUnderWay::delays_arming() {
   for (const Pending& pending : pending_.under_way()) {
     const bool earlier = pending.kind == CommandKind::clear && pending.ticket < arming_.first();
-    const bool stops = pending.kind == CommandKind::stop && pending.is_out();
-    if (pending.is_step || stops || earlier) return true;
+    if (pending.is_step || earlier) return true;
   }
-  return false;
+  return is_stopping();
 }
 
 }  // namespace r4

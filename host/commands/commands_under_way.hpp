@@ -19,9 +19,9 @@
 // E:STOP does not wait for the link. E:STOP is repeated every 20 ms until a heartbeat reports the
 // reason `stop` and the number of this stop. Then it is repeated for stop_linger, because an
 // E:CLEAR of another program may arrive. A stop that is not confirmed before its deadline has
-// failed: the session ends (Session::on_failed_stop()), and the stop is repeated for the board's
-// timeout, until which the board may obey the ended session. E:CLEAR names the cause that was known
-// at the call, and is given up when the board reports a newer cause.
+// failed: the session ends (Session::on_failed_stop()), and the stop is repeated for the link's
+// timeout, because the board may obey the ended session for its own timeout. E:CLEAR names the
+// cause that was known at the call, and is given up when the board reports a newer cause.
 #pragma once
 
 #include <cstddef>
@@ -80,6 +80,8 @@ class CommandsUnderWay {
   // True if arm() has to wait for a step, a stop, or an earlier E:CLEAR.
   bool delays_arming();
 
+  // True if a stop is under way, neither confirmed nor failed.
+  bool is_stopping();
   // True if a stop failed.
   bool expire(Time now);
   void send_queued(Time now);

@@ -53,7 +53,6 @@ std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest
     board.stop(options.rest_timeout);
     return "; the board did not confirm that its motors are at rest, so it was stopped";
   } catch (const Error&) {
-    board.stop_async();
     at_rest = false;
     return "; the board did not confirm the stop: the stop is repeated, and without heartbeats the "
            "board goes safe; " +

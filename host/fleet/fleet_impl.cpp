@@ -193,11 +193,8 @@ std::optional<FleetEvent> Fleet::Impl::next_event(Duration timeout) {
 
 FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
   const Command stop = Command::stop();
-  FleetResults results = execute(shown(stop), which, std::max(timeout, Duration{1}),
-                                 start_of(OwnCommand(stop)), why_of(stop), true);
-  // The stop must continue after its caller stops waiting.
-  if (!results.all_confirmed()) stop_async(results.failed());
-  return results;
+  return execute(shown(stop), which, std::max(timeout, Duration{1}), start_of(OwnCommand(stop)),
+                 why_of(stop), true);
 }
 
 void Fleet::Impl::stop_async(const Boards& which) {

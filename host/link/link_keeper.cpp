@@ -115,7 +115,12 @@ void LinkKeeper::begin_anew() {
 
 void LinkKeeper::hold(bool held) {
   held_ = held;
-  link_.hold(held_ || watches());
+  link_.hold(held_ || stopping_ || watches());
+}
+
+void LinkKeeper::hold_for_stop(bool stopping) {
+  stopping_ = stopping;
+  hold(held_);
 }
 
 bool LinkKeeper::is_up() const {

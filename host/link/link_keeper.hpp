@@ -46,6 +46,7 @@ class LinkKeeper {
   void leave(Time now);
   void begin_anew();
   void hold(bool held);
+  void hold_for_stop(bool stopping);
 
   // Call update() before the functions below: update() applies changes of the link to the role.
   void update() { role_.on_link(is_up()); }
@@ -81,6 +82,7 @@ class LinkKeeper {
   TransportTrouble trouble_ = TransportTrouble::none;
   bool transport_down_ = false;
   bool held_ = false;
+  bool stopping_ = false;
   bool leaving_ = false;
 };
 

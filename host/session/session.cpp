@@ -59,7 +59,9 @@ void Session::poll(Time now) {
   if (link_.long_silent(to_ms(now))) forget_board(now);
   keeper_.ask_paths(now);
   refresh(now);
-  if (commands_.expire(now)) on_failed_stop(now);  // before a heartbeat could resume the outputs
+  if (commands_.expire(now)) on_failed_stop(now);
+  // A heartbeat that arrives before the stop could resume the outputs.
+  keeper_.hold_for_stop(commands_.is_stopping() && !keeper_.is_up());
   keeper_.keep_alive(now);
   arming_.expire(now);
   if (!keeper_.controls()) keeper_.select_fields(now);  // before commands, when the link comes up

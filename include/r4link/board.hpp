@@ -185,9 +185,9 @@ class R4LINK_API Board {
   // Makes every output safe at once, and repeats until the board confirms. The stop lasts until
   // Command::clear(), or arm() of the same program. Without a confirmation within the timeout, the
   // error advises to cut the power, and a new session begins, so that the outputs do not resume
-  // when the link returns; the stop is repeated for one more timeout of the board.
+  // when the link returns. The stop is repeated for SessionOptions::timing.timeout_ms more.
   void stop(Duration timeout = default_timeout);
-  void stop_async();  // does not wait; repeated for default_timeout
+  void stop_async();  // as stop() with default_timeout; does not wait
 
   // For each channel: set() waits as send() does; post() sends once and does not wait.
   class DriveChannel {

@@ -68,28 +68,39 @@ TEST_P(FailedStop, IsNotFollowedByTheEarlierOutputs) {
   }
 }
 
-// The link returns just before the stop fails: a heartbeat of the session could still be answered.
-TEST_P(FailedStop, IsNotFollowedByTheEarlierOutputsInAHostThatStoodStill) {
-  for (std::uint32_t back_ms = 900; back_ms <= 1020; back_ms += 4) {
-    SCOPED_TRACE(back_ms);
-    RobotOnPaths robot(GetParam());
-    robot.connect();
-    ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
-    cut(robot, true);
-    robot.run(1000);
-    const Ticket stop = robot.send(Command::stop());
-    robot.run(890);
-    robot.stall(back_ms - 890);
-    cut(robot, false);
-    robot.stall(600);
-    int on_ms = 0;
-    for (int ms = 0; ms < 5000; ++ms) {
-      robot.run(1);
-      if (drives(robot)) ++on_ms;
+// A heartbeat of the session would resume the outputs, until the stop arrives.
+TEST_P(FailedStop, SendsNoHeartbeatThatCouldArriveBeforeTheStop) {
+  for (std::uint32_t call_ms = 1020; call_ms <= 2000; call_ms += 140) {
+    for (std::uint32_t back_ms = 1; back_ms < 1000; back_ms += 8) {
+      RobotOnPaths robot(GetParam());
+      robot.keeps_states = false;
+      robot.connect();
+      ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+      cut(robot, true);
+      robot.run(call_ms);
+      (void)robot.send(Command::stop());
+      robot.run(back_ms);
+      cut(robot, false);
+      robot.run(600);
+      EXPECT_EQ(robot.trips, 1) << call_ms << ' ' << back_ms;
+      EXPECT_FALSE(drives(robot));
     }
-    EXPECT_EQ(on_ms, 0);
-    EXPECT_NE(robot.finish(stop).outcome, Outcome::none);
   }
+}
+
+TEST_P(FailedStop, IsNotFollowedByTheEarlierOutputsInAHostThatStoodStill) {
+  RobotOnPaths robot(GetParam());
+  robot.connect();
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  cut(robot, true);
+  robot.run(1200);
+  (void)robot.send(Command::stop());
+  robot.run(700);
+  cut(robot, false);
+  lose(robot, "E:STOP");
+  robot.stall(900);  // the stop fails meanwhile, and heartbeats of the board arrive
+  expect_rest(robot);
+  EXPECT_EQ(robot.trips, 1);
 }
 
 TEST_P(FailedStop, LatchesIfTheLinkReturnsBeforeTheBoardIsSafe) {
@@ -150,6 +161,47 @@ TEST_P(FailedStop, CancelsCommandsAndArmsThatWait) {
   cut(robot, false);
   expect_rest(robot);
   EXPECT_EQ(robot.drive(50).outcome, Outcome::not_armed);
+}
+
+TEST_P(FailedStop, CancelsACommandThatWaitedForTheLink) {
+  RobotOnPaths robot(GetParam());
+  robot.connect();
+  cut(robot, true);
+  const Ticket stop = robot.send(Command::stop());
+  robot.run(500);
+  const auto command = Command::osmc(1, Pwm(100), Direction::forward);
+  const Ticket late = robot.session->send(command, std::chrono::seconds{30}, robot.now());
+  ASSERT_EQ(robot.finish(stop).outcome, Outcome::timed_out);
+  cut(robot, false);
+  expect_rest(robot);
+  EXPECT_EQ(robot.finish(late).outcome, Outcome::cancelled);
+}
+
+TEST_P(FailedStop, IsConfirmedLaterAndThenRepeatedForAShortTimeOnly) {
+  RobotOnPaths robot(GetParam());
+  robot.connect();
+  cut(robot, true);
+  fail_to_stop(robot);
+  cut(robot, false);
+  robot.run(300);
+  ASSERT_EQ(robot.board(0).reason(), SafeReason::stop);
+  robot.cables[0].sent.clear();
+  robot.run(1000);
+  for (const std::string& each : robot.cables[0].all('E')) {
+    EXPECT_FALSE(each.starts_with("E:STOP")) << each;
+  }
+}
+
+TEST_P(FailedStop, KeepsTheLinkIfTheTimeoutWasTooShort) {
+  RobotOnPaths robot(GetParam());
+  robot.connect();
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  const Ticket stop =
+      robot.session->send(Command::stop(), std::chrono::milliseconds{1}, robot.now());
+  EXPECT_EQ(robot.finish(stop).outcome, Outcome::timed_out);
+  expect_rest(robot);
+  EXPECT_EQ(robot.board(0).reason(), SafeReason::stop);
+  expect_control(robot);
 }
 
 TEST_P(FailedStop, IsExplainedByTheLinkAsItWas) {
