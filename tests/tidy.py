@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """clang-tidy over the product's sources: tests/tidy.py BUILD [JOBS] [--all]
 
-Without --all, checks only sources in folders that differ from origin/main or, on main itself, from 20 commits ago.
+Without --all, checks only sources in folders whose code differs from origin/main or, on main itself, from 20 commits
+ago. A changed comment is not code, except NOLINT.
 BUILD is configured with -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DR4_UNITY=ON. Files that are one source for the
 compiler (cmake/layers.cmake) are one source for clang-tidy, which then reads the headers once instead of a dozen times.
 The texts of these files are joined, not included, because the analyzer follows only code in the file that it is given.
@@ -79,16 +80,29 @@ def sources_of(build):
     return sources
 
 
+def folders_of(difference):
+    """The folders with a changed line of code, from the output of git diff."""
+    folders, names = set(), []
+    for line in difference.splitlines():
+        if line.startswith("diff --git "):
+            names = []
+        elif line.startswith(("--- a/", "+++ b/")):
+            names.append(line[6:].rstrip("\t"))
+        elif re.match(r"[-+](?!\s*(//(?!.*NOLINT).*)?$)", line) and not line.startswith(("--- ", "+++ ")):
+            folders.update((ROOT / name).parent for name in names)
+    return folders
+
+
 def changed_folders():
-    """The folders of the tree with changes, or None if the changes are unknown."""
+    """The folders of the tree with changed code, or None if the changes are unknown."""
     def git(*arguments):
         result = subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True)
         return result.stdout.strip() if result.returncode == 0 else None
     head, base = git("rev-parse", "HEAD"), git("merge-base", "HEAD", "origin/main")
     if base in (None, head):
         base = git("rev-parse", "HEAD~20")
-    names = base and git("diff", "--name-only", base)
-    return None if names is None else {(ROOT / name).parent for name in names.splitlines()}
+    difference = base and git("diff", "--no-color", "--no-renames", "--unified=0", base)
+    return None if difference is None else folders_of(difference)
 
 
 def included_twice(file):
