@@ -37,8 +37,8 @@ class UserUart {
   void next_state();
   void tell(UartBytes& out) const;
 
-  // Holds a burst of 530 bytes at 115200 baud and 100 states per second. Other bytes are
-  // lost and counted.
+  // Holds a burst of 530 bytes at 115200 baud and 100 states per second. Further bytes
+  // are lost and counted.
   static constexpr std::uint32_t capacity = 344;
   static constexpr std::uint32_t backlog = capacity - uart_max_bytes;
   static constexpr std::size_t bytes_a_turn = 64;

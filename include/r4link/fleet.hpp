@@ -171,7 +171,7 @@ class R4LINK_API Fleet {
   // Sends E:STOP to all boards in one pass before it waits, and repeats E:STOP until each board has
   // confirmed the stop. One frame on each CAN bus stops all boards of the bus, also boards outside
   // the fleet. If a board does not confirm, no error is thrown. The board's result advises to cut
-  // the power, and the stop is repeated to this board and its bus for SessionOptions::timing more.
+  // the power, and the stop is repeated to this board and its bus for timing.timeout_ms more.
   FleetResults stop(Duration timeout = default_timeout);
   void stop_async();  // as stop() with default_timeout; does not wait
 

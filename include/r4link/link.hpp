@@ -157,8 +157,8 @@ struct CommandResult {
   // Packet number of the command, as in I2CX of the state. 0: not sent.
   std::uint32_t pnum = 0;
   // `step`: the failed step of a Device's set-up, from 1. `transfer`: the answer to
-  // async_transfer() or to the failed step. If a transfer timed out and
-  // `executed` is 1, the transfer had begun.
+  // async_transfer() or to the failed step. If a transfer timed out and `executed` is
+  // 1, the transfer had begun.
   std::uint16_t step = 0;
   I2cAnswer transfer{};
 };

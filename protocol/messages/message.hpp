@@ -24,7 +24,7 @@ SafeReason heartbeat_reason(const Datagram& datagram);
 Text heartbeat_nonce(const Datagram& datagram);
 void write_nack(DatagramWriter& writer, const Nack& nack);
 
-// Words of Identity::capabilities. The board obeys E:LEAVE and W, X, X:UART, or X:DAC.
+// Words of Identity::capabilities. A board with the word obeys E:LEAVE, W, X, X:UART or X:DAC.
 constexpr Text leave_capability("leave");
 constexpr Text watch_capability("watch");
 constexpr Text i2c_capability("i2c");

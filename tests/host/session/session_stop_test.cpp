@@ -131,7 +131,7 @@ TEST_P(FailedStop, EndsTheSessionByAFarewellIfTheBoardReceivesThat) {
   expect_control(robot);
 }
 
-TEST_P(FailedStop, IsRepeatedForTheBoardsTimeoutOnly) {
+TEST_P(FailedStop, IsRepeatedForTheTimeoutOfTheLinkOnly) {
   RobotOnPaths robot(GetParam());
   robot.connect();
   cut_to_board(robot, true);
@@ -201,6 +201,33 @@ TEST_P(FailedStop, KeepsTheLinkIfTheTimeoutWasTooShort) {
   EXPECT_EQ(robot.finish(stop).outcome, Outcome::timed_out);
   expect_rest(robot);
   EXPECT_EQ(robot.board(0).reason(), SafeReason::stop);
+  expect_control(robot);
+}
+
+// While a stop is under way and the link is not up, the host sends no heartbeats.
+TEST_P(FailedStop, DoesNotKeepTheHostFromItsFirstConnection) {
+  RobotOnPaths robot(GetParam());
+  cut(robot, true);
+  robot.connect();
+  fail_to_stop(robot);
+  robot.run(1500);
+  cut(robot, false);
+  robot.run(1000);
+  EXPECT_FALSE(drives(robot));
+  expect_control(robot);
+}
+
+TEST_P(FailedStop, IsConfirmedAfterEachOutageIfTheProgramRepeatsIt) {
+  RobotOnPaths robot(GetParam());
+  robot.connect();
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  cut(robot, true);
+  for (int i = 0; i < 3; ++i) fail_to_stop(robot);
+  const Ticket stop = robot.send(Command::stop());
+  robot.run(500);
+  cut(robot, false);
+  EXPECT_EQ(robot.finish(stop).outcome, Outcome::confirmed);
+  EXPECT_EQ(robot.trips, 1);
   expect_control(robot);
 }
 

@@ -24,9 +24,9 @@
 // the exception.
 //   Without flow control, the exception needs the loss of the end of one transfer, the first frame
 //   of the next transfer, and as many further frames as the numbers need, all within N_Cr. If both
-//   transfers have n frames, n (or n - 16, n - 32 …, but at least 2) frames in a row are lost: of
-//   transfers of 18 frames, such as frames 18, 1 of the two. The datagram mixes both transfers. An
-//   N_Cr below the pause of transfers prevents this.
+//   transfers have n frames, n (or n - 16, n - 32 …, but at least 2) frames in a row are lost. With
+//   18 frames: frame 18 of a transfer and frame 1 of the next. The datagram mixes both transfers.
+//   An N_Cr below the pause of transfers prevents this.
 //   With flow control, the exception needs a flow control that arrives after N_Bs. By then the
 //   sender has begun another transfer, whose first frame is lost, too.
 #pragma once
