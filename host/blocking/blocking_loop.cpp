@@ -3,6 +3,7 @@
 
 #include <asio/post.hpp>
 #include <atomic>
+#include <exception>
 #include <future>
 #include <utility>
 #include <variant>
@@ -92,18 +93,27 @@ bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()
   // `action` stays valid, because the caller waits while it runs.
   struct Turn {
     std::atomic<bool> taken{false};  // begun by the loop, or abandoned by the caller
-    std::packaged_task<void()> task;
+    std::exception_ptr thrown;
+    std::promise<void> ended;
   };
   const auto turn = std::make_shared<Turn>();
-  turn->task = std::packaged_task<void()>(std::cref(action));
-  std::future<void> ended = turn->task.get_future();
-  const bool open = post_to_loop([turn] {
-    if (!turn->taken.exchange(true)) turn->task();
+  const std::future<void> ended = turn->ended.get_future();
+  const bool open = post_to_loop([turn, &action] {
+    if (turn->taken.exchange(true)) return;
+    try {
+      action();
+    } catch (...) {
+      turn->thrown = std::current_exception();
+    }
+    turn->ended.set_value();
   });
   if (!open) return false;
   const bool late = ended.wait_for(patience) != std::future_status::ready;
   if (late && !turn->taken.exchange(true)) throw blocked_error(what, "not done", name_.fix);
-  ended.get();
+  ended.wait();
+  // From here only the caller has the exception. ThreadSanitizer cannot see how libstdc++ counts
+  // its owners.
+  if (turn->thrown) std::rethrow_exception(std::exchange(turn->thrown, nullptr));
   return true;
 }
 

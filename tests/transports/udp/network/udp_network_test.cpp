@@ -146,7 +146,7 @@ TEST(UdpNetwork, NamesTheLostAddressOfThisComputer) {
 
 // ThreadSanitizer does not allow a child of a program with threads to start a thread, as a lookup
 // does.
-#ifndef __SANITIZE_THREAD__
+#ifndef R4_THREAD_SANITIZER
 // The board moves to another address while the network of its old address is lost. The host follows
 // the board.
 int follow_the_board_out_of_a_lost_network() {
