@@ -75,15 +75,6 @@ States states_until_now(Checking& c) {
   return states;
 }
 
-// By the board's clock, from the first released handle to the first safe state; below 0: unknown.
-double ms_to_safe(const States& states) {
-  const auto first = [&](auto is) { return std::find_if(states.begin(), states.end(), is); };
-  const auto released = first([](const State& state) { return state.handle == Handle::released; });
-  const auto safe = first([](const State& state) { return state.safe == SafeReason::handle; });
-  if (released == states.end() || safe == states.end()) return -1;
-  return static_cast<std::int32_t>(safe->t_ms - released->t_ms);
-}
-
 void find_handle(Checking& c, const State& held, const State& released) {
   const unsigned changed = held.gpio ^ released.gpio;
   for (int i = 1; i <= gpio_channels; ++i) {
@@ -155,11 +146,9 @@ void check_handle(Checking& c, int) {
             "the handle was not held");
   const State held = states_until_now(c).back();
   if (held.handle == Handle::none) return c.note("the wiring of the board has no handle");
-  c.board.forget_states();
   c.require(Topic::handle_released, "Now release the handle, and confirm.",
             "the handle was not released");
-  const States releasing = states_until_now(c);
-  const State& released = releasing.back();
+  const State released = states_until_now(c).back();
   c.measured("AINDMH held", held.volts(Analog::aindmh), "V");
   c.measured("AINDMH released", released.volts(Analog::aindmh), "V");
   if (held.handle == released.handle) return find_handle(c, held, released);
@@ -167,8 +156,6 @@ void check_handle(Checking& c, int) {
     c.found(Finding::handle_inverted);
     return c.learnt({Learnt::What::option, signals::handle, 0, {}, 1});
   }
-  const double to_safe_ms = ms_to_safe(releasing);
-  if (to_safe_ms >= 0) c.measured("from release to SAFE, to a state", to_safe_ms, "ms");
   c.require(Topic::handle_held, "Hold the handle again, and confirm.", "the handle is released");
 }
 
