@@ -28,7 +28,7 @@ constexpr CheckRow rows[] = {
     {"chips", 0, off, "", "The chips of the paper's Figure 3 answer.", check_chips},
     {"supply", analog_channels, off, "", "An analog input shows what a multimeter shows.",
      check_supply},
-    {"handle", 0, off, "", "The board goes safe when the dead-man's handle is released.",
+    {"handle", 0, off, "", "The board reads whether the dead-man's handle is held.",
      check_handle},
     {"encoder", encoder_channels, off, "",
      "An encoder counts, and the counts rise when the wheel turns forward.", check_encoder},

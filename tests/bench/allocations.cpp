@@ -10,6 +10,8 @@ namespace {
 std::atomic<std::uint64_t> count{0};
 thread_local std::uint64_t count_of_this_thread = 0;
 
+// ThreadSanitizer has its own operators, so it counts nothing.
+#ifndef R4_THREAD_SANITIZER
 void add_one() {
   count.fetch_add(1, std::memory_order_relaxed);
   ++count_of_this_thread;
@@ -31,8 +33,11 @@ void* or_throw(void* memory) {
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
+#endif
 
 }  // namespace
+
+#ifndef R4_THREAD_SANITIZER
 
 // The array forms of the standard library call these operators. A sanitizer's nothrow forms do not
 // call these operators, so this file also replaces the nothrow forms.
@@ -48,6 +53,7 @@ void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+#endif
 
 namespace r4::bench {
 

@@ -233,11 +233,12 @@ void CanBus::look_at_controller() {
 }
 
 void CanBus::go_bus_off() {
-  go_down({ErrorKind::open, medium_->name(), "the controller is bus-off: too many errors",
-           fmt::format("{}, then: ip link set {} type can restart (slcan: down, and up); with "
-                       "restart-ms 100 the interface restarts by itself",
-                       check_the_wire, medium_->name().substr(medium_->name().rfind('/') + 1))},
-          false);
+  go_down(
+      {ErrorKind::open, medium_->name(), "the controller is bus-off: too many errors",
+       fmt::format("{}, then: ip link set {} type can restart (slcan, gs_usb: down, and up); with "
+                   "restart-ms 100 the interface restarts by itself",
+                   check_the_wire, medium_->name().substr(medium_->name().rfind('/') + 1))},
+      false);
 }
 
 void CanBus::warn_of(Trouble trouble) {

@@ -76,6 +76,20 @@ TEST(DoctorCan, BusOffAndErrorsAreReported) {
   EXPECT_NE(only_finding(interface).reason.find("tx 248"), std::string::npos);
 }
 
+TEST(DoctorCan, ABusOffOfADriverThatCannotRestartIsEndedByDownAndUp) {
+  const MadeUpMachine made_up;
+  made_up.file("/sys/class/net/can0/device/uevent", "DEVTYPE=usb_interface\nDRIVER=gs_usb\n");
+  CanInterface interface = good_interface();
+  interface.restart_ms = 0;
+  EXPECT_EQ(check_can_interface(made_up.machine, interface).front().severity, Severity::ok);
+  interface.state = "bus-off";
+  EXPECT_EQ(found_by(check_can_interface(made_up.machine, interface), "can.busoff").fix,
+            "sudo sh -c 'ip link set can0 down && ip link set can0 up'");
+  interface.up = false;
+  EXPECT_EQ(check_can_interface(made_up.machine, interface).front().fix,
+            "sudo ip link set can0 up txqueuelen 1000");
+}
+
 TEST(DoctorCan, FramesOfAnotherProtocolOnAnIdOfTheBoardAreNamed) {
   CanSurvey survey({1000000, 0});
   CanFrame frame{};

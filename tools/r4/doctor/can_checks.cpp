@@ -20,9 +20,17 @@ Finding about(const CanInterface& interface, Severity severity, const char* chec
   return {severity, check, interface.name, "", "", Mending::by_hand, ErrorKind::open};
 }
 
+// The kernel's gs_usb cannot restart a controller, so newer kernels refuse `restart-ms`.
+bool can_restart(const Machine& machine, const CanInterface& interface) {
+  const std::string device =
+      machine.read("/sys/class/net/" + interface.name + "/device/uevent").value_or("");
+  return device.find("DRIVER=gs_usb") == std::string::npos;
+}
+
 // A wrong bit rate destroys the frames of all other nodes, so only the owner may choose the rate.
 Finding down(const Machine& machine, const CanInterface& interface) {
   Finding finding = about(interface, Severity::error, "can.down");
+  const bool restarts = can_restart(machine, interface);
   finding.reason = "the interface is down";
   if (!interface.has_controller) {
     finding.fix = machine.as_root(fmt::format("ip link set {} up", interface.name));
@@ -32,12 +40,12 @@ Finding down(const Machine& machine, const CanInterface& interface) {
         ", and has no bit rate; the bit rate of a board is 1000000 unless you have changed it";
     finding.fix =
         machine.as_root(fmt::format("ip link set {} up txqueuelen 1000 type can bitrate 1000000 "
-                                    "sample-point 0.875 restart-ms 100",
-                                    interface.name));
+                                    "sample-point 0.875{}",
+                                    interface.name, restarts ? " restart-ms 100" : ""));
   } else {
     finding.reason += fmt::format("; its bit rate is {}", interface.bit_rate);
-    finding.fix = machine.as_root(
-        fmt::format("ip link set {} up txqueuelen 1000 type can restart-ms 100", interface.name));
+    finding.fix = machine.as_root(fmt::format("ip link set {} up txqueuelen 1000{}", interface.name,
+                                              restarts ? " type can restart-ms 100" : ""));
     finding.mending = Mending::automatic;
   }
   return finding;
@@ -48,7 +56,10 @@ Finding bus_off(const Machine& machine, const CanInterface& interface) {
   finding.reason =
       "bus-off: the controller has stopped, because no node acknowledges its frames or the bit "
       "rates differ";
-  finding.fix = machine.as_root(fmt::format("ip link set {} type can restart", interface.name));
+  finding.fix = machine.as_root(
+      can_restart(machine, interface)
+          ? fmt::format("ip link set {} type can restart", interface.name)
+          : fmt::format("ip link set {0} down && ip link set {0} up", interface.name));
   finding.mending = Mending::automatic;
   return finding;
 }
@@ -68,7 +79,7 @@ void check_controller(const Machine& machine, const CanInterface& interface, Fin
     findings.push_back(finding);
   }
   // The kernel's slcan driver reports no bit rate and cannot restart.
-  if (interface.restart_ms == 0 && interface.bit_rate != 0) {
+  if (interface.restart_ms == 0 && interface.bit_rate != 0 && can_restart(machine, interface)) {
     Finding finding = about(interface, Severity::warning, "can.restart");
     finding.reason = "restart-ms is 0: a bus-off lasts until you restart the controller";
     finding.fix = machine.as_root(fmt::format(
