@@ -76,7 +76,7 @@ std::string_view meaning_of(Refusal refusal) {
     case Refusal::auth:
       return "the command is not signed with the board's key, or is accepted over USB only";
     case Refusal::full:
-      return "another transfer is under way";
+      return "no room, or another transfer is under way";
   }
   return "unknown code";
 }

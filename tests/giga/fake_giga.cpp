@@ -246,7 +246,9 @@ int Giga::rises(char port, int number) const {
 
 // If interrupts are on and no interrupt is running, runs the interrupts that are due.
 void Giga::interrupts_may_come() {
-  constexpr std::uint64_t bite_ns = 500000000;
+  // RM0399, IWDG: 32 kHz, divided by 4 << PR, counts from RLR down to 0.
+  const std::uint64_t bite_ns = (r4_fake_iwdg1.RLR.value + 1ULL) *
+                                (4ULL << r4_fake_iwdg1.PR.value) * 1000000000ULL / 32000ULL;
   if (watchdog_runs && now_ns_ - watchdog_fed_ns > bite_ns) {
     r4_fake_rtc.BKP8R.value = 4;  // as the boot loader does, which clears RCC_RSR
     reset();

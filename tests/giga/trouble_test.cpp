@@ -86,13 +86,12 @@ TEST(GigaWatchdog, TheReportCountsMissedDeadlinesOfTheLoop) {
   EXPECT_EQ(bench.reason(), SafeReason::link) << "two missed deadlines are forgiven";
 }
 
-TEST(GigaWatchdog, ResetsTheBoardIfTheTimerInterruptIsDead) {
+TEST(GigaWatchdog, ResetsTheBoardHalfASecondAfterTheTimerInterruptIsDead) {
   GigaBench bench;
   bench.boot();
-  EXPECT_TRUE(bench.giga.reset_by([&] {
-    bench.giga.primask = 1;
-    bench.giga.pass_ms(2000);
-  }));
+  bench.giga.primask = 1;
+  EXPECT_FALSE(bench.giga.reset_by([&] { bench.giga.pass_ms(490); }));
+  EXPECT_TRUE(bench.giga.reset_by([&] { bench.giga.pass_ms(20); }));
   bench.restart();
   EXPECT_EQ(bench.reason(), SafeReason::watchdog);
 }

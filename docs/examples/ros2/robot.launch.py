@@ -10,8 +10,7 @@ from launch.actions import ExecuteProcess
 
 def generate_launch_description():
     return LaunchDescription([
-        ExecuteProcess(cmd=['r4', 'ros2', 'serial:auto', '--namespace', 'robot', '--deadline', '0.5',
-                            '--drive', 'osmc1,osmc2', '--wheel-separation', '0.42', '--full-speed', '1.5',
-                            '--counts-per-turn', '4096'],
+        ExecuteProcess(cmd=['r4', 'ros2', 'serial:auto', '--namespace', 'robot', '--drive', 'osmc1,osmc2',
+                            '--wheel-separation', '0.42', '--full-speed', '1.5', '--counts-per-turn', '4096'],
                        output='screen', respawn=True, respawn_delay=1.0),
     ])

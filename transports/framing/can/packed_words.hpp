@@ -40,7 +40,7 @@ struct PackedWord {
 
 namespace packed {
 
-// Codes that the layouts name; state fields come first, in the order of a datagram.
+// Codes that the layouts name. The state fields of layout 4 come first, later fields at the end.
 constexpr unsigned code_servo1pos = 0x09;
 constexpr unsigned code_safe = 0x30;
 constexpr unsigned code_cmd = 0x31;

@@ -29,9 +29,10 @@ TEST_F(CanBusTest, BusOffIsDownWithAFixAndARestartIsUp) {
   local.send(error(CAN_ERR_BUSOFF));
   ASSERT_TRUE(run_until([&] { return member.events.size() == 1; }));
   EXPECT_EQ(member.events, (Told{{Kind::down, bus_off}}));
-  EXPECT_EQ(member.fix, std::string(look) +
-                            ", then: ip link set vxcan7 type can restart (slcan, gs_usb: down, and up); "
-                            "with restart-ms 100 the interface restarts by itself");
+  EXPECT_EQ(member.fix,
+            std::string(look) +
+                ", then: ip link set vxcan7 type can restart (slcan, gs_usb: down, and up); "
+                "with restart-ms 100 the interface restarts by itself");
   EXPECT_FALSE(bus->up());
   local.send(error(CAN_ERR_RESTARTED));
   ASSERT_TRUE(run_until([&] { return member.events.size() == 2; }));
