@@ -49,7 +49,7 @@ class SendQueue {
   struct Lane {
     explicit Lane(std::size_t most) : capacity(most) {}
     std::size_t capacity;
-    std::vector<Entry> entries;  // none at first, else `capacity`
+    std::vector<Entry> entries;  // empty until the first datagram, then `capacity` entries
     std::size_t first = 0;
     std::size_t count = 0;
     void pop();

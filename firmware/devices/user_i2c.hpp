@@ -49,7 +49,8 @@ class UserI2c {
     return answered;
   }
 
-  // Longer than a transfer of 32 bytes each way at 100 kHz, and than the longest stretch of SMBus.
+  // Longer than a transfer of 32 bytes each way at 100 kHz, and than the longest clock stretch that
+  // SMBus allows (25 ms).
   static constexpr std::uint32_t transfer_limit_ms = 35;
   static constexpr std::uint32_t free_after_ms = 100;  // time until a held bus is clocked again
 

@@ -52,7 +52,7 @@ class Mcp4728 final : public ChipDriver {
 
   Step step_ = Step::zero;
   std::uint32_t since_us_ = 0;   // when the EEPROM's write began
-  std::uint32_t looked_us_ = 0;  // when it was last read
+  std::uint32_t looked_us_ = 0;  // when the step began, or the chip was last read
   int eeprom_writes_ = 0;
   std::uint16_t wanted_[channels] = {};
   std::uint16_t written_[channels] = {};

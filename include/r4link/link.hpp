@@ -194,7 +194,7 @@ class PostResult {
 R4LINK_API const char* to_text(PostResult result);
 
 struct RefusedPost {
-  Command command;               // without texts
+  Command command;               // its texts are empty
   Refusal code = Refusal::none;  // the board's refusal; none if not sent: see `why`
   PostResult why = PostResult::sent;
   // If a group was refused, no command was executed. `at`: the number of `command` in the group,

@@ -28,7 +28,8 @@ BoardLink::Freshness BoardLink::judge(const HostHeartbeat& heartbeat, std::uint3
   return must_echo ? Freshness::stale : Freshness::no_echo;
 }
 
-// True if the heartbeat is newer than the session's newest. A paper host may send no numbers.
+// True if the heartbeat is newer than the session's newest heartbeat. A heartbeat of a paper host
+// that sends no numbers always continues.
 bool BoardLink::continues(const HostHeartbeat& heartbeat) const {
   if (heartbeat.has_pnum != has_heartbeat_pnum_) return false;
   return !heartbeat.has_pnum || newer(heartbeat.pnum, newest_heartbeat_);

@@ -19,7 +19,7 @@ namespace r4 {
 
 class HostLink {
  public:
-  // `first_pnum` is random, to differ from another host's executed command (CMD).
+  // `first_pnum` is random, so that the CMD of another host's command confirms no command.
   HostLink(LinkTiming timing, std::uint32_t first_pnum)
       : timing_(timing), first_pnum_(first_pnum), next_pnum_(first_pnum) {}
 

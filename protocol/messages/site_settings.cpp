@@ -11,7 +11,7 @@ namespace {
 
 constexpr Text off_word("off");
 
-// Decodes %XX; `out` ends in NUL. Refuses empty text, and a NUL within it.
+// Decodes %XX; `out` ends in NUL. Refuses an empty text and a text with a NUL.
 Refusal decode(const SettingRow& row, Text value, char* out) {
   std::size_t size = 0;
   for (std::size_t i = 0; i < value.size(); ++i) {

@@ -31,7 +31,7 @@ FileDescriptor accept_sharer(int holder);
 
 inline bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
-// True if the other end has the user of this program. If a group shares the transport, also true
+// True if the other program runs as this program's user. If a group shares the transport, also true
 // for members of the group and for root.
 bool is_one_of_us(int connection, const ShareName& name);
 pid_t process_of(int connection);

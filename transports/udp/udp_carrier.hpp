@@ -34,7 +34,7 @@ std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, 
 
 // The name under which programs share the path: the board as in the URL, and the port of hosts.
 ShareName udp_share_name(const Url& text);
-// True if the port of hosts is any free port: each program has its own.
+// True if the URL lets each program use a free port of its own.
 bool udp_has_own_port(const Url& text);
 
 }  // namespace r4

@@ -10,7 +10,7 @@ constexpr double standing_m_s = 0.02;
 constexpr double driven_rad = 0.05;  // farther away, the actuator has full duty
 constexpr double moved_rad = 0.02;
 constexpr double most_stuck_s = 0.5;
-constexpr double runaway = 1.5;  // factor above the highest allowed speed
+constexpr double runaway = 1.5;  // times the highest allowed speed
 
 }  // namespace
 

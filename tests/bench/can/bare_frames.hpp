@@ -27,7 +27,8 @@ class BareEchoProcess : public ChildProcess {
   BareEchoProcess(Wait wait, int question_frames, int answer_frames);
 };
 
-// Seconds of each of `count` round trips with a BareEchoProcess with the same numbers of frames.
+// The duration of each of `count` round trips in seconds. The BareEchoProcess must have the same
+// `question_frames` and `answer_frames`.
 std::vector<double> bare_round_trips(Wait wait, int question_frames, int answer_frames, int count);
 
 // Sends datagrams of this many frames as fast as possible. In the dialogue the sender polls for

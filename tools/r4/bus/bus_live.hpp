@@ -15,7 +15,7 @@ constexpr std::uint32_t usual_bit_rate = 1000000;  // bit/s
 struct LiveBusOptions {
   std::string url;
   bool json = false;
-  // Not set: on a terminal, repeat the last second until Ctrl-C; else run 5 s.
+  // If not set: on a terminal, show the load of the last second until Ctrl-C; else measure 5 s.
   std::optional<Milliseconds> duration;
   // If the interface (such as a virtual bus) reports no bit rate, this rate is used.
   std::optional<std::uint32_t> bit_rate;       // default 1 Mbit/s

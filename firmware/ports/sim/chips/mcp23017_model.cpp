@@ -83,7 +83,8 @@ std::uint8_t Mcp23017Model::read() {
   return value;
 }
 
-// The pointer's register: A and B alternate, or (BANK) A is 00-0A and B 10-1A.
+// Finds the port and register of the pointer; false if there is none. If BANK is set, port A has
+// 00-0A and port B 10-1A, otherwise A and B alternate.
 bool Mcp23017Model::locate(int& port, Register& number) const {
   const int index = bank() ? pointer_ & 0x0F : pointer_ / 2;
   port = bank() ? pointer_ >> 4 : pointer_ % 2;
