@@ -10,7 +10,7 @@ namespace {
 std::atomic<std::uint64_t> count{0};
 thread_local std::uint64_t count_of_this_thread = 0;
 
-// ThreadSanitizer has its own operators, so it counts nothing.
+// ThreadSanitizer has its own operators, so no allocation is counted there. Release and asan count.
 #ifndef R4_THREAD_SANITIZER
 void add_one() {
   count.fetch_add(1, std::memory_order_relaxed);

@@ -94,6 +94,8 @@ TEST(GigaWatchdog, ResetsTheBoardHalfASecondAfterTheTimerInterruptIsDead) {
   EXPECT_TRUE(bench.giga.reset_by([&] { bench.giga.pass_ms(20); }));
   bench.restart();
   EXPECT_EQ(bench.reason(), SafeReason::watchdog);
+  bench.restart();
+  EXPECT_NE(bench.reason(), SafeReason::watchdog) << "a restart ends this cause";
 }
 
 TEST(GigaFault, AProcessorFaultTurnsOutputsOffAndTheNextBootReportsIt) {
