@@ -218,6 +218,11 @@ Words refusal_words(const Command* command, Refusal code, const LinkStatus& link
             "keep the board's heartbeat interval below its timeout, and set both in one step: r4 "
             "send URL C:timeout,MS C:heartbeat,MS or link_timing()"};
       }
+      // The host checks the number of the UART before it sends the command.
+      if (code == Refusal::channel && is(CommandKind::uart_write, command)) {
+        return {fmt::format("{} (the UART is off)", refused),
+                fmt::format("switch it on, such as C:uart{},115200:8N1", command->channel)};
+      }
       if (command != nullptr) return {reason, bad_command(*command, code).fix};
       return {reason, "check the board with r4 monitor, then try again"};
     case Refusal::safe: {

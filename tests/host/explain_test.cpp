@@ -140,6 +140,13 @@ TEST(Explain, NamesACommandWithoutItsSecret) {
   EXPECT_EQ(explain(Command::setting("password", "eeeeeeee"), refused, {}).thing, "C:password,...");
 }
 
+TEST(Explain, ARefusedChannelOfAUartIsAUartThatIsOff) {
+  const CommandResult refused{Outcome::refused, Refusal::channel, Time{0}};
+  const Problem problem = explain(Command::uart_write(2, "A"), refused, {});
+  EXPECT_EQ(problem.reason, "refused by the board: CHANNEL (the UART is off)");
+  EXPECT_EQ(problem.fix, "switch it on, such as C:uart2,115200:8N1");
+}
+
 TEST(Explain, ALinkToTwoBoardsIsNotReportedAsARefusal) {
   const CommandResult refused{Outcome::refused, Refusal::none, Time{0}};
   const LinkStatus link{.causes = {LinkCause::two_boards}};

@@ -298,6 +298,8 @@ def test_services_answer_with_the_boards_confirmation(graph):
     for name in ('stop', 'arm'):
         confirmed, told = ask(peer, name, b'\0')
         assert confirmed and 'confirmed by the board' in told
+    refused = run('send', board.host_url, 'O:358,1,1')
+    assert f'controlled by r4 ros2 (pid {ros2.process.pid})' in refused.stderr, refused
     board.state('SAFE', 'stop')
     ros2.armed()
     for name in ('stop', 'arm'):

@@ -149,7 +149,8 @@ def test_each_call_in_a_fork_is_refused_or_does_nothing(tmp_path):
 
 def test_a_fork_may_end_while_a_callback_runs_in_its_parent():
     program = """
-import os, signal, sys, threading, weakref, r4link
+import os, signal, sys, threading, warnings, weakref, r4link
+warnings.simplefilter('ignore', DeprecationWarning)  # of os.fork() beside threads, from Python 3.12 on
 board = r4link.Board('sim:', callback_limit=0)
 runs, may_end = threading.Event(), threading.Event()
 subscription = board.on_state(lambda state: (runs.set(), may_end.wait(20)))

@@ -2,6 +2,7 @@
 #include "bridge.hpp"
 
 #include <fmt/format.h>
+#include <sys/prctl.h>
 
 #include <asio/post.hpp>
 #include <cstdint>
@@ -265,6 +266,9 @@ class Bridge {
 
 }  // namespace
 
-int run_bridge(const BridgeOptions& options) { return Bridge(options).run(); }
+int run_bridge(const BridgeOptions& options) {
+  ::prctl(PR_SET_NAME, "r4 ros2");  // errors of other programs name this program by it
+  return Bridge(options).run();
+}
 
 }  // namespace r4::tool::ros2
