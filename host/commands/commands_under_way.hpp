@@ -10,8 +10,9 @@
 // key. So the board executes the command only once. When CMD has passed a command, the retry's
 // answer decides: DUPLICATE proves that the command was executed, STALE that it was not. Only a
 // refusal with a session that began before the command proves that the command was not executed.
-// The board forgets executed commands over an outage. With a key, AUTH proves only that one
-// duplicate was refused. Without CMD (the paper's release), the value in a state is the proof.
+// The board forgets executed commands over an outage. With a key or several paths, AUTH proves only
+// that one duplicate was refused. Without CMD (the paper's release), the value in a state is the
+// proof.
 //
 // If the board executes groups (../link/group_support.hpp), a group is one datagram and one pending
 // command. Otherwise its commands are sent one after the other, and later commands wait.

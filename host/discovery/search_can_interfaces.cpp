@@ -105,11 +105,12 @@ class BusQuestion {
     listener_->survey().on_datagram(
         [this](std::uint8_t node, const Datagram& datagram) { hear(node, datagram.bytes()); });
   }
-  // Also adds boards from which only damaged datagrams were received.
+  // Also adds nodes without a whole datagram.
   void put_into(Discovery& found) {
     for (const auto& [node, question] : questions_) question->end();
     for (std::uint8_t node = 0; listener_ && node < can_nodes; ++node) {
-      if (listener_->survey().board(node).heard()) board_at(node);
+      const HeardNode& heard = listener_->survey().board(node);
+      if (heard.heard() && !heard.sends_datagrams()) board_at(node).foreign_frames = true;
     }
     for (auto& [node, board] : boards_) found.boards.push_back(std::move(board));
     found.buses.push_back(std::move(bus_));

@@ -162,8 +162,9 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   const bool not_taken = nack.code == Refusal::auth && !commands_.is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
   if (!paths_.news().is_copy(nack)) effects_.report(nack);
-  // AUTH refuses one duplicate. A repetition or a duplicate on another path may have been executed.
-  const bool others = (paths_.speaking() & ~path_bit(path)) != 0;
+  // AUTH refuses one duplicate. A repetition may have been executed, and so may a duplicate on
+  // another path, even if that path is down by now.
+  const bool others = paths_.count() > 1;
   const bool other_copy = nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
   const bool proof = !other_copy && is_proof(nack);
   commands_.on_refusal(nack, proof, others, now);

@@ -266,6 +266,10 @@ def test_a_watcher_sends_its_own_frame_only_while_no_host_drives(url, host_url):
         watcher.skip_past()
         watcher.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 1)
         assert any(frame == WATCH for frame, _ in dump.frames)
+        dump.frames.clear()
+        assert run('stop', url, timeout=60).returncode == 0
+        sent = {frame for frame, _ in dump.frames}
+        assert EMERGENCY in sent and COMMAND not in sent, 'r4 stop must not take control'
 
 
 def test_record_includes_datagrams_of_a_host_on_another_computer(tmp_path):
@@ -313,6 +317,13 @@ def listed_interfaces(is_told):
         listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
         if all(map(is_told, listed['vcan0']['boards'])) or time.monotonic() > deadline:
             return listed
+
+
+def test_list_says_that_a_device_with_ids_of_a_board_may_be_another_device():
+    with beside('cangen', 'vcan0', '-I', '205', '-L', '2', '-D', '0600', '-g', '20'):  # RPDO1 of CANopen device 5
+        listed = run('list', timeout=60)
+    assert re.search(r'can://vcan0\?node=5 +it may be another device, .*; look at r4 bus can://vcan0\n', listed.stdout), (
+        listed)
 
 
 def test_list_and_monitor_show_every_board_of_a_bus(tmp_path):

@@ -16,7 +16,7 @@ import pytest
 
 from lan import Lan
 from machine import within
-from r4_process import ERROR, PATIENCE_S, R4, Board, again, lasts, run
+from r4_process import ERROR, PATIENCE_S, R4, Board, again, free_port, lasts, run
 from ros2_peer import (BOOL, DIAGNOSTICS, FLOAT32, INT32, LOG, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2,
                        arm, drive, float32, health_of, join, nodes_of, own_domain, pwm, text, texts, twist)
 
@@ -298,8 +298,6 @@ def test_services_answer_with_the_boards_confirmation(graph):
     for name in ('stop', 'arm'):
         confirmed, told = ask(peer, name, b'\0')
         assert confirmed and 'confirmed by the board' in told
-    refused = run('send', board.host_url, 'O:358,1,1')
-    assert f'controlled by r4 ros2 (pid {ros2.process.pid})' in refused.stderr, refused
     board.state('SAFE', 'stop')
     ros2.armed()
     for name in ('stop', 'arm'):
@@ -396,6 +394,16 @@ def test_no_output_is_driven_before_arming():
         assert 0.25 < off['came'] - written < within(0.8)
         peer.write('rt/R4_Command', text('E:STOP'))
         board.state('SAFE', 'stop')
+
+
+def test_a_refused_host_is_told_that_r4_ros2_has_control():
+    with Board('udp://127.0.0.1:0') as board:
+        url = board.host_url.replace('listen=0', f'listen={free_port()}')  # programs with one URL share the transport
+        with Ros2(own_domain(), url, '--arm') as ros2:
+            ros2.armed()
+            refused = run('send', url, 'O:358,1,1')
+            assert f'controlled by r4 ros2 (pid {ros2.process.pid})' in refused.stderr, refused
+            assert ros2.end() == 0, ros2.errors
 
 
 def test_each_board_has_a_namespace_and_a_lost_board_is_reported():

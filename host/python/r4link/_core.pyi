@@ -497,7 +497,7 @@ class FoundBoard(_Record):
         """False: the holder watches."""
     @property
     def foreign_frames(self) -> bool:
-        """CAN: another protocol uses the board's command id, so Q:ID was not sent."""
+        """CAN: the board's ids have frames that are not R4's, so this may be another device."""
 
 class SearchedPort(_Record):
     @property

@@ -54,7 +54,8 @@ struct FoundBoard {
   // Serial and CAN: the program of this computer that holds the transport; its name may be empty.
   std::optional<Program> holder = {};
   bool holder_controls = false;  // false: the holder watches
-  // CAN: another protocol uses the board's command id, so Q:ID was not sent.
+  // CAN: frames that are not R4's use the board's command id, so Q:ID was not sent; or the board's
+  // ids have no whole datagram of a board. So this may be another device.
   bool foreign_frames = false;
 };
 

@@ -30,17 +30,15 @@ struct StopOptions {
   bool json = false;
 };
 
-// Uses its own transport if possible, because the controlling program may hang.
+// A watcher, which never takes control. Uses its own transport if possible, because the controlling
+// program may hang.
 std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
   BoardOptions options;
+  options.role = BoardRole::watch;
   auto paths = make_host_carriers(io, {url}, BoardRole::watch);
   const std::vector<std::string> urls = split_paths(url);
   for (std::size_t i = 0; i < urls.size(); ++i) {
-    if (Url::parse(urls[i]).scheme() == "serial") {
-      options.role = BoardRole::watch;
-    } else {
-      paths[i] = make_own_carrier(io, urls[i]);
-    }
+    if (Url::parse(urls[i]).scheme() != "serial") paths[i] = make_own_carrier(io, urls[i]);
   }
   auto board = std::make_unique<AsyncBoard>(io, std::move(paths), options);
   try {
@@ -61,7 +59,7 @@ void print_confirmed(const StopOptions& options, const CommandResult& result) {
     print_text(
         "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
         "it stays stopped until: r4 send {} E:CLEAR\n"
-        "or until the program in control calls arm(): end that program first\n",
+        "the program in control can also clear the stop, by arm(): to prevent this, end it\n",
         ms, join_paths(options.urls));
   }
 }

@@ -32,7 +32,9 @@ std::vector<FoundBoard> boards_at(const Discovery& all, const std::string& place
 }
 
 std::string text_of(const FoundBoard& board) {
-  std::string text = "it does not report its identity";
+  std::string text = board.foreign_frames
+                         ? "it may be another device, because its ids have frames that are not R4's"
+                         : "it does not report its identity";
   if (board.identity) {
     text = fmt::format("id {}{}, firmware {}", board.identity->board_id,
                        board.identity->name.empty() ? "" : ", name " + board.identity->name,
@@ -41,7 +43,7 @@ std::string text_of(const FoundBoard& board) {
   if (board.busy && !board.holder_controls) {
     text += *board.busy ? ", controlled by a host" : ", free";
   }
-  if (board.foreign_frames) text += ", its command id also has frames that are not R4's";
+  if (board.foreign_frames) text += fmt::format("; look at r4 bus can://{}", board.place);
   if (const std::optional<Program>& holder = board.holder) {
     text +=
         holder->name.empty()

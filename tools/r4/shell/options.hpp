@@ -66,11 +66,9 @@ void take_paths(std::string& url, std::vector<std::string>& words, const std::st
 
 bool is_url(std::string_view text);
 
-CLI::Option* add_fields(CLI::App& command, std::string& out,
-                        const std::string& meaning =
-                            "state fields to request, such as DEFAULT,ENC1,US1 or ALL; while "
-                            "another program of this computer controls the board, that "
-                            "program selects the fields");
+CLI::Option* add_fields(
+    CLI::App& command, std::string& out,
+    const std::string& meaning = "state fields to request, such as DEFAULT,ENC1,US1 or ALL");
 
 // Type names for which the completion scripts offer values.
 inline constexpr const char* url_type = "URL";
