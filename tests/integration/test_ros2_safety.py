@@ -174,7 +174,7 @@ def test_a_restarted_node_does_not_clear_an_earlier_stop():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
         assert run('stop', board.host_url).returncode == 0
-        board.state('SAFE', 'stop')
+        board.state('CONNECTING', 'stop')
         with Ros2(domain, board.host_url, '--arm') as ros2:
             told = ros2.logged('not armed: an emergency stop came before this program began')['text']
             assert told.endswith('clear the cause on purpose: send E:CLEAR to R4_Command, or call ~/clear; then arm'), told
