@@ -164,9 +164,10 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   if (!paths_.news().is_copy(nack)) effects_.report(nack);
   // AUTH refuses one duplicate. A repetition may have been executed, and so may a duplicate on
   // another path, even if that path is down by now.
-  const bool others = paths_.count() > 1;
-  const bool other_copy = nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
+  const bool other_copy =
+      nack.code == Refusal::auth && ((not_taken && key_.has_key()) || paths_.count() > 1);
   const bool proof = !other_copy && is_proof(nack);
+  const bool others = (paths_.speaking() & ~path_bit(path)) != 0;
   commands_.on_refusal(nack, proof, others, now);
   take_step_end(now);
   if (proof) posts_.on_refusal(nack);

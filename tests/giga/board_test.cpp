@@ -128,7 +128,7 @@ TEST(GigaUsb, ACommandAfterAClearDoesNotDriveDuringAnUpload) {
   EXPECT_EQ(bench.reason(), SafeReason::fault);
 }
 
-TEST(GigaUsb, UnpluggingTheCableEndsTheSession) {
+TEST(GigaUsb, ClosingThePortEndsTheSession) {
   GigaBench bench;
   bench.boot();
   PlainHost host;

@@ -135,6 +135,15 @@ TEST(Explain, DoesNotBlameLateFramesForAnUnconfirmedStop) {
   EXPECT_EQ(problem.reason.find("20 ms"), std::string::npos) << problem.reason;
 }
 
+// A stop needs no lease.
+TEST(Explain, DoesNotBlameAFullBoardForAnUnconfirmedStop) {
+  for (const LinkCause cause : {LinkCause::watchers_full, LinkCause::not_watchable}) {
+    const LinkStatus link{.state = HostLinkState::lost, .causes = {cause}};
+    const Problem problem = explain(Command::stop(), timed_out_command(), link);
+    EXPECT_NE(problem.reason.find("the board is silent"), std::string::npos) << problem.reason;
+  }
+}
+
 TEST(Explain, NamesACommandWithoutItsSecret) {
   const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
   EXPECT_EQ(explain(Command::setting("password", "eeeeeeee"), refused, {}).thing, "C:password,...");

@@ -8,7 +8,7 @@ import socket
 import struct
 
 from can_inside import PATIENTLY, ip
-from r4_process import Board
+from r4_process import Board, run
 from slcan_bus import SlcanBus
 from host_on_paths import HostOnPaths, Relay, has_joined, has_left
 
@@ -57,6 +57,15 @@ def test_a_session_survives_the_loss_of_its_cable_or_its_bus(tmp_path_factory):
                 host.ends(board)
         finally:
             cable.pull()
+
+
+def test_a_stop_over_a_bus_and_the_network_must_reach_one_board():
+    with one_bus('vcan8') as bus, Board('udp://127.0.0.1:0', f'can://{bus}?node=3', options=PATIENTLY) as board:
+        stopped = run('stop', board.host_url, f'can://{bus}?node=3', timeout=60)
+        assert stopped.returncode == 0, stopped
+        with Board(f'can://{bus}?node=4', options=PATIENTLY):
+            stopped = run('stop', board.host_url, f'can://{bus}?node=4', timeout=60)
+            assert stopped.returncode == 3 and 'two boards' in stopped.stderr, stopped
 
 
 def test_a_session_survives_bus_off_at_the_board_or_at_the_host():

@@ -146,6 +146,7 @@ def test_the_commands_of_a_group_are_executed_together_or_not_at_all(board):
 
 def test_a_command_is_refused_while_a_stop_is_latched(board):
     assert run('stop', board.host_url).returncode == 0
+    assert not any(each.get('state') == 'ACTIVE' for each in board.log), 'r4 stop must not take control'
     refused = run('send', board.host_url, 'O:358,1,1', 'D:1,1,1')
     assert refused.returncode == 3
     assert 'emergency stop' in refused.stderr and 'E:CLEAR' in refused.stderr

@@ -54,8 +54,8 @@ struct FoundBoard {
   // Serial and CAN: the program of this computer that holds the transport; its name may be empty.
   std::optional<Program> holder = {};
   bool holder_controls = false;  // false: the holder watches
-  // CAN: frames that are not R4's use the board's command id, so Q:ID was not sent; or the board's
-  // ids have no whole datagram of a board. So this may be another device.
+  // CAN: frames that are not R4's use the board's command id, so Q:ID was not sent; or no whole
+  // datagram of the board came. So this may be another device.
   bool foreign_frames = false;
 };
 

@@ -32,9 +32,8 @@ std::vector<FoundBoard> boards_at(const Discovery& all, const std::string& place
 }
 
 std::string text_of(const FoundBoard& board) {
-  std::string text = board.foreign_frames
-                         ? "it may be another device, because its ids have frames that are not R4's"
-                         : "it does not report its identity";
+  std::string text = board.foreign_frames ? "no whole datagram came, so it may be another device"
+                                          : "it does not report its identity";
   if (board.identity) {
     text = fmt::format("id {}{}, firmware {}", board.identity->board_id,
                        board.identity->name.empty() ? "" : ", name " + board.identity->name,

@@ -151,8 +151,8 @@ constexpr const char* record_footer =
 damaged datagrams and the events of the links. r4 record only watches, as r4 monitor does: it does
 not take control, and does not disturb a program that drives a board. It continues when a transport
 disconnects and reconnects. If another program moves, removes or truncates the file, r4 record
-starts a new file and reports this. While another program of this computer controls the board, that
-program selects the fields, and --fields has no effect.
+starts a new file and reports this. If another program controls the board, --fields may have no effect
+(docs/how-to/sharing.md).
 
 The file is text, one line for each datagram (docs/how-to/recordings.md); if its name ends in .zst,
 it is compressed. An existing recording is continued at its end. A crash costs at most the last

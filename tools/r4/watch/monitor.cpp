@@ -227,8 +227,8 @@ still streams its state to the monitor. With --control the monitor takes control
 command outputs, so the board is ACTIVE. The monitor continues when the transport disconnects and
 reconnects. On a CAN bus, a board that no host controls streams five times a second. A CAN URL
 without a node only listens, and shows every board on the bus. For several boards, by URLs or a
-pattern, the monitor shows a table, or the JSON of each board. While another program of this
-computer controls the board, that program selects the fields, and --fields has no effect.
+pattern, the monitor shows a table, or the JSON of each board. If another program controls the board,
+--fields may have no effect (docs/how-to/sharing.md).
 
 For a board with several paths, joined by +, the monitor shows a line for each path, and reports
 when a path begins or ceases to carry datagrams. In JSON these objects have type path, also at the
