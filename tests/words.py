@@ -3,8 +3,8 @@
 """Checks the rules of plain English that a program can check. Usage: words.py TREE [--texts]
 
 Faults: a comment of a C++ source over 100 columns; a question as a comment; "X is no Y"; a sentence of a comment or a
-page whose subject is "Who ..." or "What ..."; a page that docs/README.md does not list. Prints the words and the
-reading ease (Flesch: 60 and more is plain, below 30 is hard) of each page.
+page whose subject is "Who ..." or "What ..."; a page that docs/README.md does not list. Prints the words of the prose
+and the reading ease (Flesch: 60 and more is plain, below 30 is hard) of each page.
 
 --texts: prints each text of a program that has two words or more, with its place, for a review.
 """
@@ -53,18 +53,25 @@ def faults_of_source(path):
 
 
 def prose_of(page):
-    """The lines of a page outside of programs, numbered."""
+    """The lines of a page outside of programs and their output, numbered."""
     inside = False
     for number, line in enumerate(page.read_text(encoding='utf-8').splitlines(), 1):
         if line.startswith('```'):
             inside = not inside
         elif not inside and not line.startswith('    '):
-            yield number, re.sub(r'`[^`]*`', 'x', line)
+            yield number, line
+
+
+def words_of(page):
+    """The number of words in the prose of a page, without the addresses of links."""
+    return sum(len([word for word in re.sub(r'\]\([^)]*\)', ']', line).split() if re.search('[A-Za-z]', word)])
+               for _, line in prose_of(page))
 
 
 def reading_ease(page):
     """Flesch's figure, from words per sentence and syllables per word."""
-    text = ' '.join(re.sub(r'\]\([^)]*\)', ']', line) for _, line in prose_of(page) if not line.startswith(('|', '#')))
+    text = ' '.join(re.sub(r'\]\([^)]*\)', ']', re.sub(r'`[^`]*`', 'x', line))
+                    for _, line in prose_of(page) if not line.startswith(('|', '#')))
     sentences = max(1, len(re.findall(r'[.:;!?](?=\s|$)', text)))
     words = re.findall(r"[A-Za-z']+", text) or ['x']
     syllables = sum(max(1, len(re.findall('[aeiouy]+', re.sub('e$', '', word.lower())))) for word in words)
@@ -92,10 +99,11 @@ def main():
     total = 0
     for page in [*sorted(root.glob('*.md')), *sorted((root / 'docs').rglob('*.md'))]:
         name = str(page.relative_to(root))
-        faults += [f'{name}:{line}: {reason}' for line, text in prose_of(page) for reason in faults_of_text(text)]
+        faults += [f'{name}:{line}: {reason}' for line, text in prose_of(page)
+                   for reason in faults_of_text(re.sub(r'`[^`]*`', 'x', text))]
         if page.parent.parent == root / 'docs' and f'({page.relative_to(root / "docs")}' not in index:
             faults.append(f'{name}: docs/README.md does not list it')
-        words = len(page.read_text(encoding='utf-8').split())
+        words = words_of(page)
         total += words
         print(f'{words:6d} words, ease {reading_ease(page):3.0f}: {name}')
     print('\n'.join([*faults, f'{total} words, {len(faults)} faults']))
