@@ -113,8 +113,9 @@ void check_supply(Checking& c, int input) {
   const std::string name = analog_name(input);
   const double meter = c.number(
       Topic::meter,
-      fmt::format("What does the multimeter show at {}, against 0 V? 0: nothing is connected.",
-                  name),
+      fmt::format("{}What does the multimeter show in front of the divider of {}, against 0 V? 0: "
+                  "nothing is connected.",
+                  name == "AINDMH" ? "Hold the handle. " : "", name),
       "V");
   if (meter == 0) Checking::give_up(Status::skipped, "nothing is connected");
   std::string names;
