@@ -40,8 +40,9 @@ def test_an_asyncio_board_logs_link_events(sim, wait, logged):
     async def main():
         async with aio.Board(sim.url) as board:
             await board.wait_active()
+            # A board that is closed reports no more events.
+            await asyncio.to_thread(wait, lambda: has(logged, 'INFO', 'link active'))
     asyncio.run(main())
-    wait(lambda: has(logged, 'INFO', 'link active'))
 
 
 def test_control_characters_are_replaced_in_log_texts():
