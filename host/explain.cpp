@@ -253,11 +253,11 @@ Words refusal_words(const Command* command, Refusal code, const LinkStatus& link
 }
 
 // Causes that hold back heartbeats, commands or states, but not a stop.
-constexpr LinkCauses passed_by_a_stop{
-    LinkCause::watchdog,      LinkCause::callback,         LinkCause::foreign_frames,
-    LinkCause::busy,          LinkCause::board_has_no_key, LinkCause::key_needed,
-    LinkCause::key_not_taken, LinkCause::watchers_full,    LinkCause::not_watchable,
-    LinkCause::late_frames};
+constexpr LinkCauses passed_by_a_stop{LinkCause::watchdog,         LinkCause::callback,
+                                      LinkCause::foreign_frames,   LinkCause::busy,
+                                      LinkCause::board_has_no_key, LinkCause::key_needed,
+                                      LinkCause::key_not_taken,    LinkCause::watchers_full,
+                                      LinkCause::not_watchable,    LinkCause::late_frames};
 
 Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
   link.causes = link.causes.without(passed_by_a_stop);
