@@ -68,7 +68,7 @@ constexpr std::array<FindingText, static_cast<std::size_t>(Finding::count)> find
      "Connect a regulator to the 5 V input of the board (paper, section 8.3)."},
     {"does not move", "Nothing moved.",
      "Check the driver, its supply, its plug, and its line in the wiring. If a motor hums, a tenth "
-     "of full duty is too little for it: try a higher duty with r4 send."},
+     "of full duty may be too little for this motor: try a higher duty with r4 send."},
     {"reversed", "The movement is in the opposite direction of the command.",
      "Give the learnt wiring (inverted), or exchange the wires."},
     {"two pwm",

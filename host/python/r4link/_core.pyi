@@ -497,7 +497,7 @@ class FoundBoard(_Record):
         """False: the holder watches."""
     @property
     def foreign_frames(self) -> bool:
-        """CAN: frames with the board's ids are not R4's, or no whole datagram came: this may be another device."""
+        """CAN: the board's ids have frames that are damaged or not R4's, perhaps of another device."""
 
 class SearchedPort(_Record):
     @property

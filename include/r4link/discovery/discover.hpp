@@ -54,8 +54,7 @@ struct FoundBoard {
   // Serial and CAN: the program of this computer that holds the transport; its name may be empty.
   std::optional<Program> holder = {};
   bool holder_controls = false;  // false: the holder watches
-  // CAN: frames that are not R4's use the board's command id, so Q:ID was not sent; or no whole
-  // datagram of the board came. So this may be another device.
+  // CAN: the board's ids have frames that are damaged or not R4's, perhaps of another device.
   bool foreign_frames = false;
 };
 

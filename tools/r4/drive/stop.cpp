@@ -59,7 +59,8 @@ void print_confirmed(const StopOptions& options, const CommandResult& result) {
     print_text(
         "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
         "it stays stopped until: r4 send {} E:CLEAR\n"
-        "the program in control can also clear the stop, by arm(): to prevent this, end it\n",
+        "the program in control can also clear the stop, by arm(): to prevent this, end that "
+        "program\n",
         ms, join_paths(options.urls));
   }
 }

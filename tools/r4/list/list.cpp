@@ -32,8 +32,7 @@ std::vector<FoundBoard> boards_at(const Discovery& all, const std::string& place
 }
 
 std::string text_of(const FoundBoard& board) {
-  std::string text = board.foreign_frames ? "no whole datagram came, so it may be another device"
-                                          : "it does not report its identity";
+  std::string text = "it does not report its identity";
   if (board.identity) {
     text = fmt::format("id {}{}, firmware {}", board.identity->board_id,
                        board.identity->name.empty() ? "" : ", name " + board.identity->name,
@@ -42,7 +41,13 @@ std::string text_of(const FoundBoard& board) {
   if (board.busy && !board.holder_controls) {
     text += *board.busy ? ", controlled by a host" : ", free";
   }
-  if (board.foreign_frames) text += fmt::format("; look at r4 bus can://{}", board.place);
+  if (board.foreign_frames) {
+    text += fmt::format(
+        ", and its ids have frames that are damaged or not R4's, perhaps of another device; look "
+        "at "
+        "r4 bus can://{}",
+        board.place);
+  }
   if (const std::optional<Program>& holder = board.holder) {
     text +=
         holder->name.empty()

@@ -51,8 +51,8 @@ class UsbPort final : public firmware::Port {
     listen();  // there is room again
   }
 
-  // Sends as much as the host takes. True: the host closed the port. A
-  // Giga with its own supply may not notice that the cable is unplugged.
+  // Sends as much as the host takes. True: the host closed the port. A Giga with its own supply
+  // may not notice that the cable is unplugged.
   bool poll(std::uint32_t now_ms);
 
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
